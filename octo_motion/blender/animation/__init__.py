@@ -34,6 +34,7 @@ from .pose_keys import Keyed, PoseKeys, mark_file_changed
 from .poses import (
     SCALE,
     PoseValues,
+    PropertyValues,
     animated_bones,
     as_posed,
     displaced_bones,
@@ -43,6 +44,8 @@ from .poses import (
     rest_properties,
     restore_pose,
     show_pose,
+    show_values,
+    shown_values,
     standing_of,
 )
 from .scene_playback import play_bones, time_kept
@@ -55,6 +58,7 @@ __all__ = [
     "Keyed",
     "PoseKeys",
     "PoseValues",
+    "PropertyValues",
     "SplicedMotion",
     "actions_for",
     "animated_bones",
@@ -86,6 +90,8 @@ __all__ = [
     "scene_rate",
     "setting_values",
     "show_pose",
+    "show_values",
+    "shown_values",
     "standing_of",
     "still_clip",
     "time_kept",

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import bpy
 import numpy as np
@@ -234,6 +234,42 @@ def show_pose(
             if not bone.bone.use_local_location:
                 place = carrying_axes(bone.bone) @ place
             bone.matrix_basis = Matrix.LocRotScale(place[:], Quaternion(rotation), size)
+
+
+PropertyValues = dict[str, tuple[float, ...]]
+"""Values of an object's properties by data path."""
+
+
+def show_values(armature: bpy.types.Object, values: Mapping[str, Sequence[float]]) -> None:
+    """Set properties of an armature and its bones, without keys, by their data paths.
+
+    The next change of frame brings back what the action says. Bones that are gone are passed.
+    """
+    for path, own in values.items():
+        owner, name = _owner_of(armature, path)
+        if owner is not None:
+            setattr(owner, name, own)
+
+
+def shown_values(armature: bpy.types.Object, paths: Iterable[str]) -> PropertyValues:
+    """What properties are now that :func:`show_values` is to set, by their data paths."""
+    found: PropertyValues = {}
+    for path in paths:
+        owner, name = _owner_of(armature, path)
+        if owner is not None:
+            found[path] = tuple(getattr(owner, name))
+    return found
+
+
+def _owner_of(armature: bpy.types.Object, path: str) -> tuple[Any, str]:
+    """What has the property of a data path, none if it is gone, and the property's name."""
+    owner, _, name = path.rpartition(".")
+    if not owner:
+        return armature, name
+    try:
+        return armature.path_resolve(owner), name
+    except ValueError:
+        return None, name
 
 
 # --- Poses without keys: what a bone keeps of its own where an action says nothing ----------------

@@ -104,7 +104,7 @@ def test_what_lives_keeps_apart_like_what_is_generated(octopus: Any) -> None:
     settings.live = True
     octopus.update_tag(refresh={"OBJECT"})
     bpy.context.view_layer.update()
-    live.run_pending()
+    live.finish_following()
     assert not settings.live_error
     lived = keys(settings.result)
     assert generated.keys() == lived.keys()

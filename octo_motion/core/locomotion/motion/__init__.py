@@ -14,7 +14,7 @@ from .job import (
     Timing,
     Tolerances,
 )
-from .pipeline import MISS, MotionResult, compute
+from .pipeline import MISS, Glimpsed, MotionResult, compute, glimpse, pose
 from .planning import (
     GaitTargets,
     MotionPlan,
@@ -33,6 +33,7 @@ __all__ = [
     "Floor",
     "GaitJob",
     "GaitTargets",
+    "Glimpsed",
     "GroundJob",
     "MotionJob",
     "MotionPlan",
@@ -42,7 +43,9 @@ __all__ = [
     "Tolerances",
     "compute",
     "gait_targets",
+    "glimpse",
     "plan_motion",
+    "pose",
     "schedule",
     "shown_contacts",
 ]

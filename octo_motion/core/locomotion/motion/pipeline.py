@@ -90,6 +90,11 @@ _FLOOR_PLACES: Final = 1000
 _FLOOR_NOWHERE: Final = 1000.0
 """Arm lengths below the body: as deep as this is what has no faces."""
 
+_AROUND_CYCLES: Final = 0.15
+"""Cycles to either side of a frame that a glimpse of it is worked out from, and as moments at least
+and at most. Swings are evened out and arms make way for each other within that."""
+_AROUND_MOMENTS: Final = (8, 16)
+
 _Outcome = TypeVar("_Outcome")
 Steps = Generator[float, None, _Outcome]
 """Work in steps that yield the share of it that is done, 0…1."""
@@ -113,32 +118,15 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     Raises:
         OctoMotionError: an object is out of an arm's reach.
     """
-    job, segments, every = plan.job, plan.segments, plan.stride
-    halves = with_half_frames if plan.subframe_sampled else np.asarray
-    moments, times = halves(plan.schedule.frames), halves(plan.schedule.times)
-    standing = plan.first.standing
-    travel = plan_travel(
-        plan.schedule.route,
-        plan.schedule.travel,
-        times,
-        standing.bearings if standing is not None else None,
-    )
-    places = segments.places(travel)
-    creature = job.creature
-    # In place the ground goes by, and arms are measured as if the body went along it.
-    going = object_transforms(creature.body, creature.scale, *places)
-    keyed = _stays(plan, len(moments)) if job.in_place else going
-    reducing = plan.tolerances is not None or plan.subframe_sampled
+    moments, times = _moments(plan)
+    reducing, every = plan.tolerances is not None or plan.subframe_sampled, plan.stride
     moving = _MOVING if reducing else 1.0
     step = max(1, _BONES_AT_ONCE // max(len(plan.first.poser.bones), 1))
-    frames_per_metre = every * plan.pace.mean / plan.schedule.travel.stride
-    posing = segments.compute(travel, places, step, frames_per_metre, cyclic=job.in_place)
-    made = yield from _scaled(posing, 0.0, moving)
-    arms = _cleared(plan, made, going)
-    swimming, warnings = segments.swimming(travel.distance), list(plan.warnings)
-    reached = _reach(plan, arms, keyed, going)
-    warnings += _separate(plan, arms, reached, going, swimming=swimming, every=every)
-    motion = _motion(plan, arms, keyed, swimming)
+    posing = _posed(plan, times, step, cyclic=plan.job.in_place)
+    posed = yield from _scaled(posing, 0.0, moving)
+    arms, going, keyed, reached = posed.arms, posed.going, posed.keyed, posed.reached
+    warnings = [*plan.warnings, *posed.warnings]
+    motion = _motion(plan, arms, keyed, posed.swimming)
     on_frames = arms.at(slice(None, None, every))
     framed = going[0][::every], going[1][::every]
     measured, overlaps = _measured(plan, on_frames, framed, keyed)
@@ -149,7 +137,7 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
         channels = yield from _scaled(_reduced(plan, motion, moments, every), moving, 1.0)
         if measured is not None:
             travels = not plan.job.in_place
-            measured = measure_keyed(measured, creature, channels, travels=travels)
+            measured = measure_keyed(measured, plan.job.creature, channels, travels=travels)
     result = MotionResult(
         plan=plan,
         channels=[*channels, *plan.breath],
@@ -163,6 +151,97 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     )
     yield 1.0
     return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Posed:
+    """A body and its arms at some moments."""
+
+    arms: ArmMotion
+    going: Travelled
+    """As the body goes …"""
+    keyed: Travelled
+    """… and as it gets keys, which stays where it is in place."""
+    swimming: Floats | None
+    """How far (moments,) it swims; none where the gait never changes."""
+    reached: Reached | None
+    warnings: list[str]
+
+
+def _moments(plan: MotionPlan) -> tuple[Floats, Floats]:
+    """Frames and times (moments,) at which a motion is worked out."""
+    halves = with_half_frames if plan.subframe_sampled else np.asarray
+    return halves(plan.schedule.frames), halves(plan.schedule.times)
+
+
+def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps[_Posed]:
+    """Body and arms at times (moments,) that follow one another, so many moments at a step.
+
+    Cyclic, the last moment is the first again.
+    """
+    job, segments, every, standing = plan.job, plan.segments, plan.stride, plan.first.standing
+    travel = plan_travel(
+        plan.schedule.route,
+        plan.schedule.travel,
+        times,
+        standing.bearings if standing is not None else None,
+    )
+    places = segments.places(travel)
+    # In place the ground goes by, and arms are measured as if the body went along it.
+    going = object_transforms(job.creature.body, job.creature.scale, *places)
+    keyed = _stays(plan, len(times)) if job.in_place else going
+    frames_per_metre = every * plan.pace.mean / plan.schedule.travel.stride
+    made = yield from segments.compute(travel, places, step, frames_per_metre, cyclic=cyclic)
+    arms = _cleared(plan, made, going, cyclic=cyclic)
+    swimming = segments.swimming(travel.distance)
+    reached = _reach(plan, arms, keyed, going)
+    warnings = _separate(plan, arms, reached, going, swimming=swimming, cyclic=cyclic)
+    return _Posed(arms, going, keyed, swimming, reached, warnings)
+
+
+def glimpse(plan: MotionPlan, frame: float) -> list[Glimpsed]:
+    """What a motion is at one of its frames, long before all of it is worked out: the values of
+    all channels there.
+
+    Worked out from the moments around it that it hangs on. Before the first frame and after the
+    last it is as it is there.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right.
+    """
+    moments, times = _moments(plan)
+    if plan.job.repeats:
+        lasts = moments[-1] - moments[0]
+        frame = moments[0] + (frame - moments[0]) % lasts
+    middle = int(np.abs(moments - frame).argmin())
+    around = plan.stride * plan.pace.mean * _AROUND_CYCLES
+    around = int(np.clip(np.ceil(around), *_AROUND_MOMENTS))
+    first, last = max(middle - around, 0), middle + around + 1
+    steps = _posed(plan, times[first:last], 2 * around + 1, cyclic=False)
+    posed = _finished(steps)
+    motion = _motion(plan, posed.arms, posed.keyed, posed.swimming)
+    channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.stretch]
+    found = [Glimpsed(each.data_path, each.values[middle - first]) for each in channels]
+    shown = int(np.abs(plan.schedule.frames - frame).argmin())
+    return [*found, *(Glimpsed(each.data_path, each.values[shown]) for each in plan.breath)]
+
+
+@dataclass(frozen=True, eq=False)
+class Glimpsed:
+    """A property at one moment."""
+
+    data_path: str
+    values: Floats
+    """(components,)"""
+
+
+def _finished(steps: Steps[_Outcome]) -> _Outcome:
+    """Take all steps at once."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as finished:
+            return finished.value
 
 
 def with_half_frames(values: Floats) -> Floats:
@@ -207,13 +286,15 @@ def _underfoot(plan: MotionPlan) -> Ground | None:
     return plan.standing[0].underfoot if plan.standing else None
 
 
-def _cleared(plan: MotionPlan, made: SegmentedMotion, going: Travelled) -> ArmMotion:
+def _cleared(
+    plan: MotionPlan, made: SegmentedMotion, going: Travelled, *, cyclic: bool
+) -> ArmMotion:
     """Arms that do not dip into the ground between frames, nor swim into it."""
     arms, ground, creature = made.arms, _underfoot(plan), plan.job.creature
     if ground is None:
         return arms
     frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
-    course = ArmsOverGround(frames, ground, creature.scale, cyclic=plan.job.in_place)
+    course = ArmsOverGround(frames, ground, creature.scale, cyclic=cyclic)
     loose = plan.segments.afloat(made.travel.distance)
 
     def kept_off(poses: Poses, share: Floats | None) -> Poses:
@@ -292,7 +373,7 @@ def _separate(
     going: Travelled,
     *,
     swimming: Floats | None,
-    every: int,
+    cyclic: bool,
 ) -> list[str]:
     """Let arms make way for each other, but for those that reach; what there is to warn of."""
     job, volume = plan.job, plan.job.volume
@@ -309,9 +390,9 @@ def _separate(
         travel=going,
         ground=_underfoot(plan),
         scale=job.creature.scale,
-        frames_per_cycle=every * plan.pace.mean,
+        frames_per_cycle=plan.stride * plan.pace.mean,
         opened=_opened(plan, len(arms.rotations), swimming),
-        cyclic=job.in_place,
+        cyclic=cyclic,
     )
     if moved is not None:
         arms.rotations = moved

@@ -203,15 +203,20 @@ class MotionPlan:
         standing = self.first.standing
         return standing.line.clearance if standing is not None else self.first.height
 
-    @cached_property
-    def subframe_sampled(self) -> bool:
-        """Whether the motion is worked out half way between frames, too: a cycle has so few frames
-        that its keys have to keep to that. What is reached for is known on frames alone.
+    @property
+    def wants_subframes(self) -> bool:
+        """Whether a cycle has so few frames that its keys have to keep to what is half way between
+        them, too. What is reached for is known on frames alone.
         """
         if not (self.standing or self.segments.transitions) or self.job.reaching is not None:
             return False
+        return self.pace.hurried
+
+    @cached_property
+    def subframe_sampled(self) -> bool:
+        """Whether the motion is worked out half way between frames, too."""
         affordable = len(self.schedule.frames) * len(self.first.poser.bones) <= _QUICKLY
-        return self.pace.hurried and (affordable or not self.job.live)
+        return self.wants_subframes and (affordable or not self.job.live)
 
     @property
     def stride(self) -> int:

@@ -2,18 +2,19 @@
 """The motion made: by the button, or live, by itself.
 
 Live, whoever drags a point of the route or a slider sees the motion follow. Blender tells after
-each update what has changed. If that is something that a motion was made from, a timer makes the
-motion anew a moment later, in place, outside the update; what changes in the meantime waits for the
-same turn. Only an action that was generated and that nobody has edited is touched. What our own
-writing changes is let through Blender's update before we listen again. Where nothing is live,
-Blender is not kept waiting: thousands of objects may move with each frame.
+each update what has changed. If that is something that a motion was made from, a timer shows the
+frame in sight as it is going to be, outside the update; what changes in the meantime waits for the
+same turn. Once nothing has changed for a while, the motion is made anew in place, in short turns
+between which Blender goes on. Only an action that was generated and that nobody has edited is
+touched. What our own writing changes is let through Blender's update before we listen again. Where
+nothing is live, Blender is not kept waiting: thousands of objects may move with each frame.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from typing import Any, Final, cast
 
@@ -26,7 +27,7 @@ from ....blender.rig import active_armature, deformed_meshes, read_skeleton
 from ....core.content_cache import clear_caches, content_key
 from ....core.errors import OctoMotionError, RigError
 from ...declared_settings import assign, plain
-from ...modal_job import ModalJob
+from ...modal_job import Job, ModalJob
 from ...operator_base import ArmatureOperator
 from ..reading import playing_action, previous_action
 from ..settings import (
@@ -36,7 +37,7 @@ from ..settings import (
     once_called,
     read_overrides,
 )
-from ..writing import RESULTS, Shot, Summary, make, prepare
+from ..writing import RESULTS, Following, Shot, Summary, make, prepare
 
 PATIENCE: Final = 1.5
 """Seconds that the window may stand still; a longer job shows its progress and can be stopped."""
@@ -110,8 +111,12 @@ def _goes(item: bpy.types.Object) -> bool:
 # --- What is known while a motion is live ---------------------------------------------------------
 
 
-_SOON: Final = 0.01
-"""Seconds from a change to the new motion at least: what changes together is made together."""
+_SOON: Final = 0.0
+"""Seconds from a change to the frame in sight at least: what changes together is told together."""
+_IDLE: Final = 0.1
+"""Seconds without a change after which all other frames follow …"""
+_TURN: Final = 0.008
+"""… and for how long at a time."""
 _LATER: Final = 0.3
 """Seconds until it is tried again, while Blender renders or a tool of ours runs."""
 _NO_MATTER: Final = RESULTS | {
@@ -123,6 +128,15 @@ _NO_MATTER: Final = RESULTS | {
 
 
 @dataclass
+class _Work:
+    """A motion on its way."""
+
+    motion: Following | None
+    """None while it is made as Generate does."""
+    job: Job
+
+
+@dataclass
 class _State:
     """What is known between two updates."""
 
@@ -130,6 +144,8 @@ class _State:
     """What each live armature's motion was made from, by the object's name."""
     changed: dict[str, bool] = field(default_factory=dict)
     """Armatures to look at, and whether it is known already that they changed."""
+    following: dict[str, _Work] = field(default_factory=dict)
+    """Motions of which no more than the frame in sight is there, by the armature's name."""
     rates: dict[str, float] = field(default_factory=dict)
     """Frames per second of each scene."""
     complete: bool = False
@@ -168,6 +184,7 @@ def _handlers() -> list[tuple[Any, Any]]:
         (known.redo_pre, _before_undo),
         (known.undo_post, _after_undo),
         (known.redo_post, _after_undo),
+        (known.save_pre, _before_saving),
         (known.load_pre, _before_loading),
         (known.load_post, _after_loading),
         (known.blend_import_post, _after_import),
@@ -179,16 +196,17 @@ def made(armature: bpy.types.Object) -> None:
     settings = locomotion_settings(armature)
     if settings.live:
         _state.seen[armature.name] = _made_from(armature, settings)
+    _state.following.pop(armature.name, None)
     assign(settings, "live_error", "")
 
 
 def pending() -> bool:
-    """Whether a motion is about to be made."""
+    """Whether the frame in sight is about to be made."""
     return bpy.app.timers.is_registered(run_pending)
 
 
 def run_pending() -> float | None:
-    """What the timer does: make the motions anew whose sources have changed.
+    """What the timer does: show the frame in sight of motions whose sources have changed.
 
     Returns seconds until it has to be called again, none if all is done.
     """
@@ -198,7 +216,34 @@ def run_pending() -> float | None:
     _state.changed.clear()
     for name, certain in changed.items():
         _follow(name, certain=certain)
+    # From the last change on, not from the first.
+    _stop(run_following)
+    if _state.following:
+        bpy.app.timers.register(run_following, first_interval=0.0 if _plays() else _IDLE)
     return None
+
+
+def run_following() -> float | None:
+    """What another timer does: all other frames, in short turns.
+
+    Returns seconds until it has to be called again, none if all is done.
+    """
+    if _state.busy or _others_at_work():
+        return _LATER
+    if not pending():
+        for name in list(_state.following)[:1]:
+            _go_on(name, _TURN)
+    return 0.0 if _state.following else None
+
+
+def finish_following() -> None:
+    """Make all motions that are on their way at once."""
+    if pending():
+        _stop(run_pending)
+        run_pending()
+    _stop(run_following)
+    while _state.following:
+        _go_on(next(iter(_state.following)), np.inf)
 
 
 # --- What Blender tells --------------------------------------------------------------------------
@@ -232,10 +277,11 @@ def _after_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
 
 
 @persistent
-def _after_frame(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+def _after_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """A change that comes together with another frame, as while it plays, is told here alone."""
     if _state.busy or depsgraph.mode != "VIEWPORT" or not _listens():
         return
+    _show_again(scene)
     followed = [each for name in _state.seen if (each := _armature(name)) is not None]
     sources = [_sources(each) for each in followed]
     touched = _touched(depsgraph, set(followed).union(*sources))
@@ -246,6 +292,22 @@ def _after_frame(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
             _soon(armature.name, certain=False, wait=_LATER)
         if not still.isdisjoint(its):
             _soon(armature.name, certain=True)
+
+
+def _show_again(scene: bpy.types.Scene) -> None:
+    """Show motions that are on their way as they are going to be at another frame, too."""
+    if not _state.following or _plays():
+        return
+    _state.busy = True
+    try:
+        for name, work in _state.following.items():
+            armature = _armature(name)
+            if armature is not None and work.motion is not None and name in scene.objects:
+                # What is wrong is told when all of it is worked out.
+                with suppress(OctoMotionError):
+                    work.motion.show(armature, scene.frame_current_final)
+    finally:
+        _state.busy = False
 
 
 def _listens() -> bool:
@@ -372,6 +434,13 @@ def _after_undo(*_: object) -> None:
 
 
 @persistent
+def _before_saving(*_: object) -> None:
+    """What is saved belongs together, route and motion."""
+    if not (_state.busy or _others_at_work()):
+        finish_following()
+
+
+@persistent
 def _before_loading(*_: object) -> None:
     _drop()
     _state.clear()
@@ -403,8 +472,22 @@ def _soon(name: str, *, certain: bool, wait: float = _SOON) -> None:
 
 def _drop() -> None:
     _state.changed.clear()
-    if pending():
-        bpy.app.timers.unregister(run_pending)
+    _state.following.clear()
+    _stop(run_pending)
+    _stop(run_following)
+
+
+def _stop(timer: Callable[[], float | None]) -> None:
+    if bpy.app.timers.is_registered(timer):
+        bpy.app.timers.unregister(timer)
+
+
+def _plays() -> bool:
+    """Whether any window plays: each frame then shows what the action says."""
+    manager = bpy.context.window_manager
+    return manager is not None and any(
+        each.screen is not None and each.screen.is_animation_playing for each in manager.windows
+    )
 
 
 def _others_at_work() -> bool:
@@ -438,31 +521,99 @@ def _follow(name: str, *, certain: bool) -> None:
         return
     if not certain and _state.seen.get(name) == _made_from(armature, settings):
         return
-    with _deaf(), _window_of(armature):
-        try:
-            _make(armature, settings)
-        except OctoMotionError as error:
-            settings.live_error = str(error)
-        except BaseException:
-            settings.live = False
-            settings.live_error = "Live has stopped at a fault: the console tells which."
-            raise
+    with _telling(armature, settings), _deaf(), _window_of(armature):
+        _make(armature, settings)
     if settings.live:
         _state.seen[name] = _made_from(armature, settings)
 
 
+@contextmanager
+def _telling(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> Iterator[None]:
+    """Tell in the panel what goes wrong within; the motion stays as it was."""
+    try:
+        yield
+    except OctoMotionError as error:
+        _let_go(armature)
+        settings.live_error = str(error)
+    except BaseException:
+        _let_go(armature)
+        settings.live = False
+        settings.live_error = "Live has stopped at a fault: the console tells which."
+        raise
+
+
 def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> None:
-    kept = _whose(armature, settings)
-    if kept:
+    """Show the frame in sight, and let the others follow."""
+    earlier = _state.following.get(armature.name)
+    shown = earlier.motion if earlier is not None else None
+    motion = Following(armature, bpy.context, shown.before if shown is not None else None)
+    _state.following[armature.name] = _Work(motion, Job(motion.steps()))
+    # Whose action it is that another frame shows again is looked at before it is written.
+    scene = bpy.context.scene
+    if scene is not None and _generated(armature, settings):
+        motion.show(armature, scene.frame_current_final)
+    assign(settings, "live_error", "")
+
+
+def _go_on(name: str, seconds: float) -> None:
+    """Work for so long on a motion that is on its way, and write it when it is there."""
+    armature, work = _armature(name), _state.following[name]
+    settings = locomotion_settings(armature) if armature is not None else None
+    if armature is None or settings is None or not settings.live:
+        _let_go(armature, name)
+        return
+    with _telling(armature, settings), _window_of(armature):
+        if not work.job.work(seconds):
+            return
+        with _deaf():
+            _write(armature, settings, work.motion)
+
+
+def _write(
+    armature: bpy.types.Object,
+    settings: OCTO_MOTION_PG_locomotion,
+    motion: Following | None,
+) -> None:
+    """Write a motion that was worked out; where Generate makes other keys of it, these follow."""
+    if motion is None:
+        del _state.following[armature.name]
+        return
+    if kept := _whose(armature, settings):
         settings.live = False
         settings.live_error = kept
         _state.seen.pop(armature.name, None)
+        _let_go(armature)
         return
-    shot = prepare(armature, bpy.context, live=True)
-    for _ in shot.compute():
-        pass
-    shot.write(unedited=True)
-    assign(settings, "live_error", "")
+    motion.write()
+    # Markers of contacts are where the motion has them now.
+    _state.seen[armature.name] = _made_from(armature, settings)
+    if motion.exact:
+        del _state.following[armature.name]
+    else:
+        _state.following[armature.name] = _Work(None, Job(_exactly(armature)))
+
+
+def _exactly(armature: bpy.types.Object) -> Iterator[float]:
+    """What Generate does."""
+    shot = prepare(armature, bpy.context)
+    yield from shot.compute()
+    if not _whose(armature, locomotion_settings(armature)):
+        with _deaf():
+            shot.write(unedited=True)
+
+
+def _let_go(armature: bpy.types.Object | None, name: str = "") -> None:
+    """Leave a motion that was on its way, and show what is there."""
+    work = _state.following.pop(armature.name if armature is not None else name, None)
+    if work is not None and work.motion is not None and armature is not None:
+        with _deaf():
+            work.motion.give_back(armature)
+
+
+def _generated(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> bool:
+    """Whether the armature plays what was generated, or nothing."""
+    playing = playing_action(armature)
+    return playing is None or playing == previous_action(armature, settings)
 
 
 def _whose(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> str:

@@ -458,8 +458,8 @@ class Outcome:
     live: props.BoolProperty(
         name="Live",
         description="Make the motion anew by itself whenever its route, its ground or a setting "
-        "changes, with a key on every frame. Generate measures it and leaves out keys. Switches "
-        "itself off when you edit the action",
+        "changes: the frame in sight at once, all others while Blender idles. Generate measures "
+        "it. Switches itself off when you edit the action",
         update=_tell,
     )
     live_error: props.StringProperty(
