@@ -17,7 +17,7 @@ bpy.ops.render.render()
 """
 
 trial = subprocess.run(  # noqa: S603 - our own Python and the lines above
-    [sys.executable, "-c", ONE_PIXEL], capture_output=True, text=True, check=False
+    [sys.executable, "-c", ONE_PIXEL], capture_output=True, encoding="utf-8", check=False
 )
 if trial.returncode != 0:
     last_words = (trial.stderr.strip().splitlines() or [f"status {trial.returncode}"])[-1]

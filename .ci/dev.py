@@ -63,7 +63,7 @@ def find_python(version: str) -> str:
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
-                text=True,
+                encoding="utf-8",
                 check=False,
             )
         except OSError:
@@ -85,7 +85,7 @@ def candidates(version: str) -> Iterator[list[str]]:
             [uv, "python", "find", version],
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            text=True,
+            encoding="utf-8",
             check=False,
         )
         if found.stdout.strip():

@@ -43,7 +43,6 @@ def main(blender: str, archive: str) -> None:
                 env=environment,
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
-                text=True,
                 encoding="utf-8",
                 errors="replace",
                 check=False,

@@ -38,6 +38,39 @@ def end(process: int) -> None:
     os.kill(process, getattr(signal, "SIGKILL", signal.SIGTERM))
 
 
+def has_console() -> bool:
+    """Whether processes can be asked to stop: on Windows it is their console that does."""
+    if sys.platform != "win32":
+        return True
+    windows: Any = ctypes
+    return bool(windows.WinDLL("kernel32").GetConsoleProcessList((ctypes.c_uint32 * 1)(), 1))
+
+
+def processor_seconds(process: int) -> float:
+    """Time that processors have worked for a process, in s."""
+    if sys.platform == "linux":
+        fields = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2]
+        ticks = sum(map(int, fields.split()[11:13]))
+        return ticks / os.sysconf("SC_CLK_TCK")
+    if sys.platform == "win32":
+        windows: Any = ctypes
+        kernel = windows.WinDLL("kernel32")
+        kernel.OpenProcess.restype = ctypes.c_void_p
+        handle = ctypes.c_void_p(kernel.OpenProcess(_QUERY, 0, process))
+        times = [ctypes.c_uint64() for _ in range(4)]
+        kernel.GetProcessTimes(handle, *map(ctypes.byref, times))
+        kernel.CloseHandle(handle)
+        return 1e-7 * (times[2].value + times[3].value)
+    command = ["ps", "-o", "time=", "-p", str(process)]
+    told = subprocess.run(command, capture_output=True, encoding="utf-8", check=True).stdout
+    minutes, seconds = told.strip().split(":")[-2:]
+    return 60.0 * int(minutes) + float(seconds)
+
+
+_QUERY = 0x1000
+"""PROCESS_QUERY_LIMITED_INFORMATION"""
+
+
 def _running() -> dict[int, int]:
     """The parent of each process that runs."""
     if sys.platform == "linux":

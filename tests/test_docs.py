@@ -565,7 +565,7 @@ def test_every_make_target_that_is_named_exists(page: Path) -> None:
         ["make", "--no-print-directory", "help"],
         cwd=REPOSITORY,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=True,
     )
     targets = {line.split()[1] for line in listed.stdout.splitlines()}

@@ -75,7 +75,7 @@ def test_layer_without_blender_can_be_imported_whole_where_bpy_is_absent(layer: 
         [sys.executable, "-W", "error", "-c", script],
         cwd=REPOSITORY,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
 

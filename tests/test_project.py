@@ -93,7 +93,7 @@ def test_make_help_lists_every_target() -> None:
         ["make", "--no-print-directory", "help"],
         cwd=REPOSITORY,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=True,
     )
     assert [line.split()[1] for line in run.stdout.splitlines()] == phony[1].split()
@@ -104,7 +104,10 @@ def test_every_target_of_make_is_a_task_that_needs_no_make() -> None:
     phony = re.search(r"^\.PHONY: (.*)$", makefile, re.MULTILINE)
     assert phony
     run = subprocess.run(
-        [sys.executable, SET_UP / "dev.py", "help"], capture_output=True, text=True, check=True
+        [sys.executable, SET_UP / "dev.py", "help"],
+        capture_output=True,
+        encoding="utf-8",
+        check=True,
     )
     tasks = [line.split()[0] for line in run.stdout.splitlines()]
     assert [each for each in tasks if each not in {"venv", "find-python"}] == phony[1].split()
@@ -129,7 +132,7 @@ def run_on(machine: Path, *command: str) -> subprocess.CompletedProcess[str]:
         cwd=machine / "project",
         env={"PATH": f"{machine / 'broken'}:{machine / 'tools'}", "HOME": str(machine)},
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
 

@@ -37,6 +37,8 @@ _GRACE: Final = 5.0
 """Seconds that a process has to end before it is ended."""
 _GLANCE: Final = 0.05
 """Seconds between two looks at the processes."""
+_FAULT: Final = 0xC0000000
+"""From here on, a status of Windows is a fault of the program."""
 _HEARTBEAT: Final = 0.5
 """Seconds between two looks whether the parent is there."""
 
@@ -62,6 +64,8 @@ class Ended:
     @property
     def reason(self) -> str:
         """How it ended, for a process that should have said more."""
+        if self.status >= _FAULT:
+            return f"Blender crashed (0x{self.status:X})."
         if self.status >= 0:
             return f"Blender ended early, with status {self.status}."
         try:
@@ -302,6 +306,10 @@ def run_shot(request: Path, answer: Path) -> int:
     def clean_up() -> None:
         for place in asked.places.values():
             remove_staged(place)
+        # Windows deletes no file that is open, and the log is what we write to.
+        for number in (1, 2):
+            with contextlib.suppress(OSError):
+                os.close(number)
         # Requests, answers and logs of a run that is no more.
         shutil.rmtree(request.parent, ignore_errors=True)
 

@@ -68,7 +68,7 @@ def measure(case: Case) -> Measured:
         finished = subprocess.run(
             [sys.executable, "-m", "tests.bench.case", str(path), json.dumps(asdict(case))],
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             check=False,
         )
         if finished.returncode != 0 or not path.exists():

@@ -35,7 +35,7 @@ def measure() -> list[Measured]:
         finished = subprocess.run(
             [sys.executable, "-m", "tests.bench.live_speed", str(path)],
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             check=False,
         )
         if finished.returncode != 0 or not path.exists():

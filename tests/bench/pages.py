@@ -199,7 +199,10 @@ def _commit() -> str:
 
     def git(*words: str) -> str:
         asked = subprocess.run(
-            ["git", "-C", str(REPOSITORY), *words], capture_output=True, text=True, check=False
+            ["git", "-C", str(REPOSITORY), *words],
+            capture_output=True,
+            encoding="utf-8",
+            check=False,
         )
         return asked.stdout.strip() if asked.returncode == 0 else ""
 

@@ -84,7 +84,7 @@ def measure(*words: str) -> Any:
         path = Path(folder) / "result.json"
         command = [sys.executable, "-m", "tests.bench", "posing", *words, "--json", str(path)]
         finished = subprocess.run(
-            command, env=os.environ | _ONE_CORE, capture_output=True, text=True, check=False
+            command, env=os.environ | _ONE_CORE, capture_output=True, encoding="utf-8", check=False
         )
         if finished.returncode != 0 or not path.exists():
             sys.exit(f"Measuring the puppet failed:\n{finished.stderr}")
@@ -158,7 +158,7 @@ def _middle_and_worst(seconds: Floats) -> tuple[float, float]:
 
 def _mujoco(figures: dict[str, Figure], steps: int) -> list[Measured]:
     found = subprocess.run(
-        [".ci/dev", "venv", "mujoco"], capture_output=True, text=True, check=False
+        [".ci/dev", "venv", "mujoco"], capture_output=True, encoding="utf-8", check=False
     )
     if found.returncode != 0:
         _warn("could not be set up", found.stderr)
@@ -172,7 +172,7 @@ def _mujoco(figures: dict[str, Figure], steps: int) -> list[Measured]:
         [found.stdout.strip(), str(Path(__file__).with_name("mujoco_side.py"))],
         input=json.dumps(asked),
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
     if run.returncode != 0:

@@ -92,7 +92,7 @@ def _measure(frames: int) -> Measured:
         finished = subprocess.run(
             [sys.executable, "-m", "tests.bench.splice_speed", str(path), str(frames)],
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             check=False,
         )
         if finished.returncode != 0 or not path.exists():

@@ -302,7 +302,7 @@ def test_a_rigify_human_lists_the_bones_that_an_artist_keys() -> None:
         [sys.executable, "-c", RIGIFY_HUMAN],
         cwd=Path(__file__).resolve().parents[2],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=True,
     )
     (line,) = (line for line in run.stdout.splitlines() if line.startswith("FOUND "))

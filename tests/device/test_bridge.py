@@ -233,7 +233,7 @@ def test_program_runs_from_where_blender_installs_it(tmp_path: Path) -> None:
     run = subprocess.run(
         [process.python_executable(), "-I", installed / launcher, "descriptor"],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=True,
     )
     assert run.stdout.startswith("0x06, 0x4f, 0xff, 0x09, 0x01, 0xa1, 0x01")
@@ -263,7 +263,7 @@ def test_program_without_blender_ends_without_a_riddle(command: str, said: str) 
         [sys.executable, str(process.LAUNCHER), command],
         input=said,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         timeout=60.0,
         check=False,
     )

@@ -359,7 +359,7 @@ def test_key_is_made_once_and_only_its_owner_may_read_it(tmp_path: Path) -> None
     key = packets.key_in(path)
     assert len(key) == 16
     assert packets.key_in(path) == key
-    assert bytes.fromhex(path.read_text()) == key
+    assert bytes.fromhex(path.read_text(encoding="utf-8")) == key
     if os.name != "nt":
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
         path.chmod(0o644)

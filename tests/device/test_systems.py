@@ -63,7 +63,7 @@ def test_blenders_python_finds_the_c_runtime_that_blender_brings(tmp_path: Path)
 
 def test_launcher_takes_the_folder_of_libraries_and_no_program_sees_it(tmp_path: Path) -> None:
     command = [sys.executable, "-I", process.LAUNCHER, "descriptor", "--dlls", tmp_path]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    run = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
     assert run.returncode == 0, run.stderr
     assert run.stdout.startswith("0x06")
 

@@ -4,10 +4,11 @@
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable
-from contextlib import chdir
+from contextlib import ExitStack, chdir, suppress
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -18,25 +19,25 @@ import pytest
 from octo_motion import command_line
 from octo_motion.command_line import bake, commands
 from octo_motion.core.errors import WriteError
+from tests.processes import has_console
 
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
+WINDOWS = os.name == "nt"
 PROGRAM = "python -m octo_motion"
 RANGE = 'settings = { timing = "RANGE", frame_end = 6 }\n'
 SMALL = "octopus = { arms = 4, joints = 3, with_mesh = false }\n"
 ROUTE = "route = [[0, 0, 0], [0, -1, 0], [1, -1, 0], [2, -1, 0]]\n"
-
-posix = pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals")
 
 
 def run(*arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """The command in a process of its own."""
     return subprocess.run(
         [sys.executable, "-m", "octo_motion", *arguments],
-        env={**os.environ, "PYTHONPATH": str(REPOSITORY), **environment},
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY), "PYTHONUTF8": "1", **environment},
         cwd=REPOSITORY,
         stdin=subprocess.DEVNULL,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
         timeout=120,
     )
@@ -285,7 +286,7 @@ def test_rig_that_is_linked_is_moved_through_its_override_and_watched(tmp_path: 
     assert statuses(job) == {"a": "done"}
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "out" / "a.blend"))
     # Paths relative to the file lead from the new folder.
-    assert [each.filepath for each in bpy.data.libraries] == ["//../rig.blend"]
+    assert [each.filepath for each in bpy.data.libraries] == [f"//..{os.sep}rig.blend"]
     octopus: Any = bpy.data.objects["Octopus"]
     assert octopus.override_library
     assert tuple(octopus.animation_data.action.frame_range) == (1, 6)
@@ -340,9 +341,8 @@ def grieving(folder: Path, grief: str) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": os.pathsep.join([str(REPOSITORY), str(site)])}
 
 
-@posix
 def test_blender_that_is_killed_while_it_writes_leaves_nothing_behind(tmp_path: Path) -> None:
-    environment = grieving(tmp_path, "os.kill(os.getpid(), signal.SIGKILL)")
+    environment = grieving(tmp_path, "from tests.processes import end; end(os.getpid())")
     job = write(
         tmp_path / "job.toml",
         f'[[shots]]\nname = "a"\noutput = "out/a.blend"\n{SMALL}{ROUTE}{RANGE}',
@@ -351,7 +351,9 @@ def test_blender_that_is_killed_while_it_writes_leaves_nothing_behind(tmp_path: 
     ended = run("bake", job, **environment)
 
     assert ended.returncode == 4, ended.stdout + ended.stderr
-    assert report(job)["a"]["error"] == "Blender crashed or was ended (SIGKILL)."
+    # Windows tells a status alone, which whoever ends a process chooses.
+    how = "ended early, with status 15" if WINDOWS else "crashed or was ended (SIGKILL)"
+    assert report(job)["a"]["error"] == f"Blender {how}."
     assert names(tmp_path / "out") == set()
     assert run_here("bake", job) == 0
     assert statuses(job) == {"a": "done"}
@@ -368,42 +370,45 @@ def test_fault_of_ours_is_one_shots_and_leaves_its_traceback_in_the_report(tmp_p
     assert names(tmp_path / "out") == set()
 
 
-@posix
-@pytest.mark.parametrize("name", ["SIGINT", "SIGKILL"])
+@pytest.mark.parametrize("how", ["asked to stop", "killed"])
 def test_run_that_is_stopped_leaves_no_process_and_no_unfinished_file(
-    tmp_path: Path, name: str
+    tmp_path: Path, how: str
 ) -> None:
+    if how != "killed" and not has_console():
+        pytest.skip("there is no console, whose Ctrl-Break this is")
     text = f'[defaults]\noutput = "out/{{name}}.blend"\n{SMALL}{ROUTE}{RANGE}'
     job = write(tmp_path / "job.toml", text + '[[shots]]\nname="a"\n[[shots]]\nname="b"\n')
-    # The shots hold one end of a pipe as long as they live; a byte says that they have got so far.
-    os.mkfifo(tmp_path / "pipe")
-    path = str(tmp_path / "pipe")
-    environment = grieving(
-        tmp_path, f"end = open({path!r}, 'wb', 0); end.write(b'.'); time.sleep(600)"
-    )
     (tmp_path / "tmp").mkdir()
-    environment["TMPDIR"] = str(tmp_path / "tmp")
-    process = subprocess.Popen(
-        [sys.executable, "-m", "octo_motion", "bake", job, "--jobs", "2"],
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    with (tmp_path / "pipe").open("rb", buffering=0) as pipe:
-        arrived = pipe.read(1)
-        if len(arrived) == 1:
-            arrived += pipe.read(1)
+    with socket.create_server(("127.0.0.1", 0)) as server, ExitStack() as shots:
+        server.settimeout(120.0)
+        # The shots hold a line as long as they live; that it is there says that they are so far.
+        line = f"socket.create_connection(('127.0.0.1', {server.getsockname()[1]}))"
+        environment = grieving(tmp_path, f"import socket; line = {line}; time.sleep(600)")
+        environment["TMPDIR"] = str(tmp_path / "tmp")
+        process = subprocess.Popen(
+            [sys.executable, "-m", "octo_motion", "bake", job, "--jobs", "2"],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
+        )
+        lines = [shots.enter_context(server.accept()[0]) for _ in "ab"]
         assert len(names(tmp_path / "out")) == 4
-        process.send_signal(signal.Signals[name])
+        if how == "killed":
+            process.kill()
+        else:
+            process.send_signal(getattr(signal, "CTRL_BREAK_EVENT", signal.SIGINT))
         status = process.wait()
-        assert pipe.read() == b""  # which comes when both have ended
+        for each in lines:
+            each.settimeout(60.0)
+            with suppress(ConnectionResetError):  # as Windows tells that they have ended
+                assert each.recv(1) == b""
 
-    assert arrived == b".."
     assert names(tmp_path / "out") == set()
     assert not list((tmp_path / "tmp").glob("octo-motion-*"))
-    if name == "SIGKILL":
-        assert status == -signal.Signals[name]
+    if how == "killed":
+        assert status not in {0, 130}
     else:
         assert status == 130
         assert {shot["error"] for shot in report(job).values()} == {"Stopped before it was done."}
@@ -497,8 +502,8 @@ def test_open_file_is_used_where_no_other_is_named(scene: Path, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (("none.blend",), (3, "There is no file '{folder}/none.blend'.")),
-        (("torn.blend",), (3, "'{folder}/torn.blend' cannot be opened: ")),
+        (("none.blend",), (3, "There is no file '{folder}none.blend'.")),
+        (("torn.blend",), (3, "'{folder}torn.blend' cannot be opened: ")),
         (("reef.blend",), (3, "'Octopus' has no route.")),
         (
             ("reef.blend", "--armature", "Squid"),
@@ -540,7 +545,7 @@ def test_complaint_of_generate(
     status, sentence = complaint
     with chdir(tmp_path):
         assert run_here("generate", *arguments, *output) == status
-    assert sentence.format(folder=tmp_path) in capfd.readouterr().err
+    assert sentence.format(folder=f"{tmp_path}{os.sep}") in capfd.readouterr().err
     assert names(tmp_path) == before
 
 

@@ -100,7 +100,7 @@ def test_several_splices_onto_a_motion_file_in_one_command(folder: Path) -> None
         cwd=folder,
         stdin=subprocess.DEVNULL,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
         timeout=120,
     )

@@ -29,7 +29,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
         cwd=REPOSITORY,
         env=dict(os.environ) | {"PYTHONPATH": str(REPOSITORY)},
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
         timeout=300,  # Blender 4.5 hangs at exit where an operator is left
     )

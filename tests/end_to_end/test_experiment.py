@@ -22,7 +22,7 @@ def studio(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
         cwd=REPOSITORY,
         env=dict(os.environ) | {"PYTHONPATH": str(REPOSITORY)},
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
         timeout=300,  # Blender 4.5 hangs at exit where an operator is left
     )

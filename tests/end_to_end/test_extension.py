@@ -20,7 +20,7 @@ def run_blender(*arguments: str | Path) -> str:
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
-        text=True,
+        encoding="utf-8",
         check=False,
         timeout=120,  # Blender 4.5 hangs at exit where an operator, menu entry or timer is left
     )

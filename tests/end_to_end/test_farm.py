@@ -129,7 +129,8 @@ def test_task_that_lost_its_record_is_done_and_what_is_there_stays(
     assert {name: after[name] for name in same} == {name: before[name] for name in same}
     assert after["status"] == "skipped"
     # Nobody knows whether somebody has worked on it since: it is not overwritten unasked.
-    job.write_text(job.read_text(encoding="utf-8").replace("frame_end = 6", "frame_end = 7"))
+    longer = job.read_text(encoding="utf-8").replace("frame_end = 6", "frame_end = 7")
+    job.write_text(longer, encoding="utf-8")
     assert task(job, "--shot", "a") == 3
     assert (tmp_path / "out/a.blend").read_bytes() == kept
     assert task(job, "--shot", "a", "--force") == 0
@@ -270,7 +271,7 @@ def test_task_is_stopped_in_its_first_second_without_a_word(tmp_path: Path, how:
         env=environment(PYTHONPATH=paths),
         stdin=subprocess.DEVNULL,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
     assert (ended.returncode, ended.stdout) == (130, "")

@@ -67,9 +67,13 @@ def open_job_description(folder: Path, openjd: str) -> list[str]:
     given = [f"-p{name}={value}" for name, value in {"Job": job, "Shots": 7, "Chunk": 3}.items()]
     given.append(f"-pBlender={jobs.blender(folder)}")
     for words in (["check", str(TEMPLATE)], ["summary", str(TEMPLATE), *given]):
-        print(subprocess.run([openjd, *words], text=True, capture_output=True, check=True).stdout)
+        print(
+            subprocess.run(
+                [openjd, *words], encoding="utf-8", capture_output=True, check=True
+            ).stdout
+        )
     ended = subprocess.run(
-        [openjd, "run", str(TEMPLATE), *given], text=True, capture_output=True, check=False
+        [openjd, "run", str(TEMPLATE), *given], encoding="utf-8", capture_output=True, check=False
     )
     lines = ended.stdout.splitlines()
     told = ("openjd_progress", "Places(", "Results", "Session ended", "Duration", "Chunks")
@@ -85,7 +89,7 @@ def flamenco(folder: Path, node: str) -> list[str]:
     settings = {"job_file": str(job), "shots": 7, "chunk_size": 3}
     command = [node, "-e", COMPILER, str(FLAMENCO), json.dumps(settings)]
     compiled = json.loads(
-        subprocess.run(command, text=True, capture_output=True, check=True).stdout
+        subprocess.run(command, encoding="utf-8", capture_output=True, check=True).stdout
     )
     waiting, done = list(compiled["tasks"]), set[int]()
     while waiting:

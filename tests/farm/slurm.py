@@ -76,7 +76,7 @@ class Slurm:
             env={**self._environment(), **environment},
             cwd=self.folder,
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             check=True,
         ).stdout
 

@@ -92,7 +92,7 @@ def test_everything_is_made_by_one_command(tmp_path: Path) -> None:
             cwd=pages.REPOSITORY,
             env=environment,
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             check=False,
             timeout=500,  # Blender 4.5 hangs at exit where an operator is left
         )

@@ -81,7 +81,8 @@ def main() -> int:
     if wanted.json:
         Path(wanted.json).write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     if wanted.write:
-        LIMITS.write_text(json.dumps(_tightened(limits, rows), indent=1, sort_keys=True) + "\n")
+        text = json.dumps(_tightened(limits, rows), indent=1, sort_keys=True)
+        LIMITS.write_text(text + "\n", encoding="utf-8")
     print(f"\n{beyond} figures are beyond their limits." if beyond else "\nAll within limits.")
     return int(beyond > 0)
 
@@ -199,7 +200,9 @@ def _scenes(wanted: argparse.Namespace) -> list[str]:
 def _process(name: str, wanted: argparse.Namespace) -> Row:
     command = [sys.executable, "-m", "tests.referee", "--scene", name]
     command += ["--no-pops"] * wanted.no_pops + ["--pops-alone"] * wanted.pops_alone
-    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, cwd=REPOSITORY, capture_output=True, encoding="utf-8", check=False
+    )
     print(".", end="", file=sys.stderr, flush=True)
     if done.returncode:
         print(f"{name}: {done.stderr.strip().splitlines()[-1:]}", file=sys.stderr)

@@ -67,6 +67,6 @@ def test_a_dropped_gait_is_loaded_without_a_file_browser(tmp_path: Path) -> None
     bpy.ops.octo_motion.gait_load(name="swim")
     table = {**json.loads(settings.table.as_text), "name": "mine"}
     path = tmp_path / "mine.json"
-    path.write_text(json.dumps(table))
+    path.write_text(json.dumps(table), encoding="utf-8")
     assert bpy.ops.octo_motion.gait_import("INVOKE_DEFAULT", filepath=str(path)) == {"FINISHED"}
     assert settings.gait == "mine"

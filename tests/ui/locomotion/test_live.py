@@ -605,6 +605,6 @@ def test_nothing_is_left_of_it_when_the_add_on_is_switched_off() -> None:
     )
     root = str(Path(octo_motion.__file__).parent.parent)
     finished = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, cwd=root, check=False
+        [sys.executable, "-c", script], capture_output=True, encoding="utf-8", cwd=root, check=False
     )
     assert "clean" in finished.stdout, finished.stderr

@@ -205,7 +205,7 @@ def test_names_below_the_pictures_outlive_what_blender_was_told() -> None:
 def test_a_click_on_the_picture_of_a_damaged_set_up_leaves_all_as_it_was(
     settings: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    (tmp_path / "walk.py").write_text("1 / 0")
+    (tmp_path / "walk.py").write_text("1 / 0", encoding="utf-8")
     paths = {**setups.setup_paths(), "walk": tmp_path / "walk.py"}
     monkeypatch.setattr(setups, "setup_paths", lambda: paths)
     bpy.ops.octo_motion.setup_load(name="swim")
