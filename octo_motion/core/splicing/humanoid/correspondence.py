@@ -222,8 +222,9 @@ def _stand_otherwise(
     if all(each.toe is None for each in feet):
         return False
     if referred:
-        # A dancer on tiptoe does not tell how a foot stands.
-        return bool(np.dot(ours, theirs) < _UNLIKE)
+        # A dancer on tiptoe does not tell how a foot stands. Nor does the end of a foot without
+        # toes, which is where a file has put it.
+        return all(each.toe is not None for each in feet) and bool(np.dot(ours, theirs) < _UNLIKE)
     return any(each.pointed for each in feet) and not all(each.pointed for each in feet)
 
 

@@ -61,27 +61,31 @@ class Landmarks:
 
 _WORDS: Final[dict[str, str]] = {
     "hips": "hips hip pelvis cog=.5 center=.6 torso=.5 センター=.7 腰=.9 腰部=.9 下半身=.8 骨盤 "
-    "ヒップ",
+    "ヒップ becken 髋=.9",
     "spine": "spine abdomen ab lowerback lowback lowerspine spinelower waist=.6 torso=.5 back=.5 "
     "belly=.7 stomach=.7 lumbar 上半身 背骨 脊椎 脊柱 腹=.7 腹部=.7 胴=.5 体幹=.5",
-    "chest": "chest upperchest thorax ribcage torso=.6 spineupper upperspine 上半身=.5 胸 胸部",
-    "neck": "neck lowerneck necklower neckbase upperneck=.8 neckupper=.8 首 頸 頸部",
-    "head": "head skull=.7 cranium=.7 頭 頭部",
-    "clavicle": "clavicle collar collarbone clav shoulder=.7 shldr=.4 scapula=.5 肩 鎖骨",
-    "upper_arm": "upperarm uparm arm=.85 shldr=.8 shldrbend shoulder=.6 humerus 腕 上腕 上腕部 "
-    "肩関節",
-    "forearm": "forearm lowerarm lowarm loarm forearmbend elbow=.95 ulna=.8 ひじ 肘 肘関節 "
-    "前腕 前腕部",
-    "hand": "hand wrist palm=.5 手首 手=.9 手関節 手のひら=.5 掌=.5",
-    "thigh": "thigh upleg upperleg thighbend femur hip=.65 leg=.5 足=.9 脚=.9 もも 太もも 太腿 "
-    "大腿 大腿部 股関節",
-    "shin": "shin calf lowerleg lowleg loleg knee=.95 leg=.75 tibia ひざ 膝 膝関節 すね 脛 "
-    "下腿 下腿部",
-    "foot": "foot ankle 足首 足関節 足=.3",
-    "toe": "toe toes toebase ball forefoot foot=.3 つま先 つまさき 爪先 足先=.8",
+    "chest": "chest upperchest thorax thoracic=.8 ribcage torso=.6 spineupper upperspine brust "
+    "brustkorb 上半身=.5 胸 胸部 胸腔",
+    "neck": "neck lowerneck necklower neckbase upperneck=.8 neckupper=.8 cervical=.7 hals "
+    "首 頸 頸部 颈 颈部 脖子",
+    "head": "head skull=.7 cranium=.7 kopf 頭 頭部 头 头部",
+    "clavicle": "clavicle collar collarbone clav shoulder=.7 shldr=.4 scapula=.5 "
+    "schulter=.7 schlüsselbein 肩 鎖骨 锁骨 肩膀=.7",
+    "upper_arm": "upperarm uparm uarm armupper arm=.85 shldr=.8 shldrbend shoulder=.6 humerus "
+    "oberarm 腕 上腕 上腕部 肩関節 上臂 大臂",
+    "forearm": "forearm armlower lowerarm lowarm loarm forearmbend elbow=.95 ulna=.8 radius=.8 "
+    "farm unterarm ひじ 肘 肘関節 前腕 前腕部 前臂 小臂 下臂 手肘",
+    "hand": "hand wrist palm=.5 carpals=.8 手首 手=.9 手関節 手のひら=.5 掌=.5 手腕 手掌=.9",
+    "thigh": "thigh upleg legupper upperleg thighbend femur hip=.65 leg=.5 足=.9 脚=.9 もも 太もも "
+    "太腿 大腿 大腿部 股関節 oberschenkel",
+    "shin": "shin calf leglower lowerleg lowleg loleg knee=.95 leg=.75 tibia shank "
+    "unterschenkel ひざ 膝 膝関節 すね 脛 下腿 下腿部 小腿 膝盖",
+    "foot": "foot ankle fuss fuß talus=.8 足首 足関節 足=.3 脚=.6 脚踝 脚腕",
+    "toe": "toe toes toebase ball forefoot foot=.3 つま先 つまさき 爪先 足先=.8 zehen zeh "
+    "脚趾 脚掌=.8",
 }
 """What each landmark is called, words of a name written together; with a weight where a word means
-it only in some rigs. Japanese ones in whichever kana."""
+it only in some rigs. English, German, Chinese; Japanese ones in whichever kana."""
 
 _FINGERS: Final = (
     "thumb index mid middle ring pinky little finger fingers fingerbase metacarpal "
@@ -90,7 +94,7 @@ _FINGERS: Final = (
 _FACE: Final = "eye eyes jaw tongue teeth brow lip ear ears nose cheek hair breast chin lid 目 両目"
 _ENDS: Final = "end nub tip top leaf site effector dummy"
 _RIG: Final = (
-    "ik ikp pole target twist roll spin rock tweak mch wgt vis parent socket helper master "
+    "part ik ikp pole target twist roll spin rock tweak mch wgt vis parent socket helper master "
     "widget prop weapon buttock 捩 捩り 腕捩 腕捩り 手捩 手捩り 親 全ての親 操作中心 補助 ダミー"
 )
 _HIRAGANA: Final = {code: code - 0x60 for code in range(ord("ァ"), ord("ヶ") + 1)}
@@ -98,7 +102,7 @@ _HIRAGANA: Final = {code: code - 0x60 for code in range(ord("ァ"), ord("ヶ") +
 _NO_PART: Final = frozenset(f"{_FINGERS} {_FACE} {_ENDS} {_RIG}".translate(_HIRAGANA).split())
 """A name with one of these is no landmark, whatever else it says."""
 
-_CHARACTER: Final = "mixamorig bip biped valvebiped armature metarig character genesis j c cc m b"
+_CHARACTER: Final = "mixamorig bip biped valvebiped armature metarig character genesis j c cc m b x"
 _FILLING: Final = frozenset(f"{_CHARACTER} jnt joint jt bone bn bind rig skeleton skel".split()) | {
     *("def", "org", "fk", "ctrl")
 }
@@ -106,18 +110,28 @@ _FILLING: Final = frozenset(f"{_CHARACTER} jnt joint jt bone bn bind rig skeleto
 
 _SIDES: Final = MappingProxyType(
     {
-        **dict.fromkeys(("l", "left", "lft", "左", "ひだり"), "L"),
-        **dict.fromkeys(("r", "right", "rgt", "右", "みぎ"), "R"),
+        **dict.fromkeys(("l", "left", "lft", "links", "左", "ひだり"), "L"),
+        **dict.fromkeys(("r", "right", "rgt", "rechts", "右", "みぎ"), "R"),
     }
 )
 _SIDE_PREFIX: Final = re.compile(r"^(left|right|左|右|ひだり|みぎ|l|r)(?=.)")
 _SIDE_SUFFIX: Final = re.compile(r"(?<=.)(left|right|左|右|ひだり|みぎ)$")
 _WORD: Final = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|[^\W\d_a-zA-Z]+|\d+")
 _VERTEBRA: Final = re.compile(r"^[TL]\d{1,2}$")
+_RUN_TOGETHER: Final = re.compile(r"^[LR][UF]$")
+"""Side and first letter of what follows: "LUArm", "RFArm"."""
 _NAMESPACE: Final = re.compile(r"^.*[:|](?=.)")
 
 _COPY_WEIGHTS: Final = MappingProxyType({"def": 0.9, "org": 0.8})
 """Copies that follow the bones an artist moves, in rigs that have both."""
+
+_REGIONS: Final = frozenset({"arm", "leg", "head", "spine", "body", "root"})
+"""Words that may stand before others to say where in the body they are: "arm left elbow"."""
+
+_BESIDE_A_SIDE: Final = MappingProxyType(
+    {"larm": "lowerarm", "lleg": "lowerleg", "uarm": "upperarm", "uleg": "upperleg"}
+)
+"""Words short for others where the side is said: "l_larm", not "larm"."""
 
 _STRANGE_WORD: Final = 0.3
 """What is left of the weight of a name with a word that nobody knows ("head armour")."""
@@ -193,7 +207,9 @@ def _words(name: str) -> tuple[str, ...]:
         if _VERTEBRA.match(part):
             found.append("spine")
         else:
-            found += [word.lower() for word in _WORD.findall(part)]
+            words = _WORD.findall(part)
+            split = [[*word] if _RUN_TOGETHER.match(word) else [word] for word in words]
+            found += [word.lower() for each in split for word in each]
     return tuple(found)
 
 
@@ -206,7 +222,9 @@ def _read(words: tuple[str, ...], common: set[str]) -> BoneName:
             side = _SIDES[word]
         elif not (word.isdigit() or word in filling):
             rest.append(word)
-    if not side:
+    if side:
+        rest = [_BESIDE_A_SIDE.get(word, word) for word in rest]
+    else:
         side, rest = _side_within(rest)
     numbers = [word for word in words if word.isdigit()]
     machinery = any(word in _NO_PART for word in rest)
@@ -237,18 +255,26 @@ def _side_within(words: list[str]) -> tuple[str, list[str]]:
 
 
 def _lookup(words: list[str], side: str) -> dict[str, float]:
-    """Meanings of the longest run of words that has one."""
+    """Meanings of the longest run of words that has one; what stands before may only say where."""
+    regions = next((n for n, word in enumerate(words) if word not in _REGIONS), len(words))
+    for first in range(min(regions, len(words) - 1), 0, -1):
+        meanings = _MEANINGS.get("".join(words[first:]))
+        if meanings and _MEANINGS.get("".join(words)) is None:
+            return _of_side(meanings, side, 1.0)
     for length in range(len(words), 0, -1):
         for start in range(len(words) - length + 1):
             meanings = _MEANINGS.get("".join(words[start : start + length]))
             if meanings:
-                share = 1.0 if length == len(words) else _STRANGE_WORD
-                return {
-                    part: share * weight
-                    for part, weight in meanings.items()
-                    if bool(side) == (part in _SIDED_PARTS) or not side
-                }
+                return _of_side(meanings, side, 1.0 if length == len(words) else _STRANGE_WORD)
     return {}
+
+
+def _of_side(meanings: Mapping[str, float], side: str, share: float) -> dict[str, float]:
+    return {
+        part: share * weight
+        for part, weight in meanings.items()
+        if bool(side) == (part in _SIDED_PARTS) or not side
+    }
 
 
 _SIDED_PARTS: Final = frozenset(_WORDS) - {"hips", "spine", "chest", "neck", "head"}

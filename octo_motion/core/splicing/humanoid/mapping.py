@@ -18,7 +18,16 @@ import numpy as np
 from ...rotations import Floats
 from ...skeleton import Skeleton
 from .landmarks import LANDMARKS, OPTIONAL, Landmarks, read_names
-from .name_match import ARM, LEG, OPTIONAL_PARTS, BodyProportions, body_of, find_limb, find_trunk
+from .name_match import (
+    ARM,
+    LEG,
+    OPTIONAL_PARTS,
+    BodyProportions,
+    body_of,
+    find_limb,
+    find_trunk,
+    points_to_its_end,
+)
 from .shape_match import Shape, shape_of
 
 LIMBS: Final = {"arm": ARM, "leg": LEG}
@@ -181,7 +190,12 @@ def _left_by_feet(
     upward = up / max(float(np.linalg.norm(up)), 1e-12)
     for leg in legs:
         foot = skeleton.heads[leg["foot"]]
-        tip = skeleton.heads[leg["toe"]] if "toe" in leg else skeleton.tails[leg["foot"]]
+        if "toe" in leg:
+            tip = skeleton.heads[leg["toe"]]
+        elif points_to_its_end(skeleton, leg["shin"], leg["foot"]):
+            tip = skeleton.tails[leg["foot"]]
+        else:
+            return None
         forward += tip - foot
         down += foot - skeleton.heads[leg["thigh"]]
     leg_lengths = float(np.linalg.norm(down))

@@ -23,6 +23,13 @@ OPTIONAL_PARTS: Final = frozenset({"clavicle", "toe"})
 _LEAST_WEIGHT: Final = 0.12
 """Below, a name says nothing."""
 
+_SURELY: Final = 0.5
+"""Weight of a name that leaves little doubt."""
+
+_ON_THE_MIDDLE: Final = 0.012
+_NEAR_IT: Final = 0.05
+"""Of a body's size: how far bones of the middle lie beside it, as they should and at most."""
+
 
 @dataclass(frozen=True, eq=False)
 class BodyProportions:
@@ -114,7 +121,26 @@ def find_limb(
         ]
         if part == "hand" and rivals[part] and "forearm" in chosen:
             chosen[part] = _straightest(body, chosen["forearm"], [bone, *rivals[part]])
+    if {"foot", "toe"} <= chosen.keys():
+        chosen["toe"] = _ball(body, chosen["foot"], chosen["toe"])
     return chosen, {part: others for part, others in rivals.items() if others}
+
+
+def _ball(body: BodyProportions, foot: int, toe: int) -> int:
+    """Where a foot rolls: "ankle → foot → toe" begins its foot there, where toes are at its tip."""
+    path = body.skeleton.ancestors(toe)
+    between = path[: path.index(foot)] if foot in path else []
+    heads = body.skeleton.heads
+    reach = float(np.linalg.norm(heads[toe] - heads[foot]))
+    return next(
+        (
+            bone
+            for bone in between
+            if body.weight(bone, "foot") > _SURELY
+            and float(np.linalg.norm(heads[bone] - heads[foot])) > _SURELY * reach
+        ),
+        toe,
+    )
 
 
 def _are_beside(body: BodyProportions, one: int, other: int) -> bool:
@@ -199,7 +225,7 @@ def _follows(body: BodyProportions, before: int, bone: int, chain: Mapping[str, 
     skeleton = body.skeleton
     part = next(name for name, each in chain.items() if each == before)
     gap = float(np.linalg.norm(skeleton.heads[bone] - skeleton.heads[before]))
-    score = -_unevenness(body, before, chain, gap)
+    score = -_unevenness(body, before, chain, gap) if part in {"forearm", "shin"} else 0.0
     if body.names[bone].layer != body.names[before].layer:
         score -= 0.3
     if part != "clavicle" and gap < 0.01 * body.size:
@@ -280,6 +306,12 @@ def find_trunk(
         return {}
     found = {"head": head}
     chest = _carrier(body, [*shoulders, head], "chest")
+    neck = None
+    if chest is not None and body.weight(chest, "neck") > _SURELY:
+        # Some programs hang collar bones on the neck: what it stands on is the chest all the same.
+        above = [bone for bone in body.skeleton.ancestors(chest) if _is_free(body, bone)]
+        if len(above) > 1 and head != chest:
+            neck, chest = chest, above[0]
     if chest is not None:
         found["chest"] = chest
     hips = _hips(body, thighs, shins, head if chest is None else chest)
@@ -291,9 +323,9 @@ def find_trunk(
     bending = [bone for bone in _between(body, hips, chest) if body.weight(bone, "hips") < 1.0]
     if bending:
         found["spine"] = bending[0]
-    necks = _between(body, chest, head)
+    necks = _between(body, chest, head) if neck is None else [neck]
     if necks:
-        named = (bone for bone in necks if body.weight(bone, "neck") > 0.5)
+        named = (bone for bone in necks if body.weight(bone, "neck") > _SURELY)
         found["neck"] = next(named, necks[0])
     return found
 
@@ -370,25 +402,47 @@ def _end_of_middle(
         return None
     up = skeleton.heads[start] - skeleton.heads[list(thighs)].mean(axis=0)
     step = 0.005 * body.size * float(np.linalg.norm(up))
+    carriers = {bone for each in shoulders for bone in (each, *skeleton.ancestors(each))}
     row: list[int] = []
     bone = start
     while True:
         children = [
             child
             for child in skeleton.children[bone]
-            if body.off_middle(child) < 0.012
+            if child not in carriers
             and not body.sides[child]
             and not body.names[child].machinery
-            and not any(
-                child == each or child in body.skeleton.ancestors(each) for each in shoulders
-            )
-            # Jaw and hair turn back.
-            and float(skeleton.rest_matrices[child][:3, 1] @ up) > 0.0
+            and _goes_up(skeleton, child, up)
             # A face starts within the head.
             and (not row or float((skeleton.heads[child] - skeleton.heads[bone]) @ up) > step)
         ]
+        # In a motion, a neck may be off the middle for a while.
+        if len(children) > 1:
+            near = [child for child in children if body.off_middle(child) < _ON_THE_MIDDLE]
+            children = near or [child for child in children if body.off_middle(child) < _NEAR_IT]
         if len(children) != 1:
             break
         bone = children[0]
         row.append(bone)
     return row[-1] if row else None
+
+
+def _goes_up(skeleton: Skeleton, bone: int, up: Floats) -> bool:
+    """Whether a bone leads on: jaw and hair turn back."""
+    children = skeleton.children[bone]
+    if children:
+        way = skeleton.heads[list(children)].mean(axis=0) - skeleton.heads[bone]
+    elif points_to_its_end(skeleton, skeleton.parents[bone], bone):
+        way = skeleton.rest_matrices[bone][:3, 1]
+    else:
+        return True
+    return float(way @ up) > 0.0
+
+
+def points_to_its_end(skeleton: Skeleton, bone: int, child: int) -> bool:
+    """Whether a bone's own Y axis leads to the next one, as Blender draws it: in files of other
+    programs it may lie anyhow.
+    """
+    way = skeleton.heads[child] - skeleton.heads[bone]
+    along = float(way @ skeleton.rest_matrices[bone][:3, 1])
+    return along > 0.9 * float(np.linalg.norm(way)) > 0.0

@@ -230,7 +230,16 @@ def kind_bones(
             "Look at the bone table, or choose another part.",
         )
     path = [*above[: above.index(top)][::-1], end]
-    return path if kind.spine else bones_beneath(skeleton, path[:1])
+    if kind.spine:
+        return path
+    # A neck that carries the arms is no part of the head.
+    carriers = {
+        each
+        for name in ("upper_arm.L", "upper_arm.R")
+        if (arm := skeleton.index.get(landmarks.get(name) or "")) is not None
+        for each in skeleton.ancestors(arm)
+    }
+    return bones_beneath(skeleton, [next(each for each in path if each not in carriers)])
 
 
 def _spoken(landmark: str) -> str:

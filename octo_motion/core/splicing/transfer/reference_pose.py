@@ -77,6 +77,13 @@ _DOUBTFUL: Final = 0.2
 _RIGID: Final = 2e-3
 """Of the body's size: what a joint may move against a bone and count as fixed to it."""
 
+_ROOTS: Final = (0.05, 0.12)
+"""Of the shoulders' width: how far the collar bones' roots are apart where they begin to tell left
+from right, and where they tell it alone."""
+
+_SQUARE: Final = float(np.cos(np.radians(20.0)))
+"""Cosine of the angle by which their line may be off that of the shoulders."""
+
 _X, _Z = np.eye(3)[[0, 2]]
 _LIMBS: Final = (
     # root, middle and end; what they are seen from; where they hang, where they rest, and the axis
@@ -304,9 +311,27 @@ class _Finder:
         low = self._joints("spine" if "spine" in self._bones else "hips")
         left = self._joints("upper_arm.L") - self._joints("upper_arm.R")
         return _axes(
-            robust_direction(self._seen(chest, left), self._standing),
+            self._shoulder_line(chest, left),
             robust_direction(self._seen(chest, self._top() - low), self._standing),
         )
+
+    def _shoulder_line(self, chest: int, left: Floats) -> Floats:
+        """(3,) to the left along the chest's axes: by the collar bones' roots, which no shrug
+        and no raised arm moves; by the shoulders where those are in the middle or move.
+        """
+        shoulders = robust_direction(self._seen(chest, left), self._standing)
+        if not {"clavicle.L", "clavicle.R"} <= self._bones.keys():
+            return shoulders
+        roots = self._seen(chest, self._joints("clavicle.L") - self._joints("clavicle.R"))
+        middle = np.median(roots, axis=0)
+        width = float(np.median(_lengths(left)))
+        apart = float(np.linalg.norm(middle))
+        still = _lengths(roots - middle).max() < _RIGID * width
+        if not still or normalized(middle) @ shoulders < _SQUARE:
+            return shoulders
+        told = np.array(apart / max(width, 1e-12))
+        share = smooth_step((told - _ROOTS[0]) / (_ROOTS[1] - _ROOTS[0]))
+        return normalized((1.0 - share) * shoulders + share * normalized(middle))
 
     def _limb(
         self, bones: Sequence[int], frame: tuple[int, Floats], bends: Floats, goal: Floats

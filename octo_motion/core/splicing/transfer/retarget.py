@@ -186,6 +186,8 @@ class Retarget:
     """Whether the part is seen from upright axes that face as the frames do."""
     spine: bool = False
     """Whether the part is a trunk."""
+    same_build: bool = False
+    """Whether the two bodies are the same, up to one factor: not just the part's bones."""
 
     @cached_property
     def joined(self) -> _JoinedBones | None:
@@ -305,7 +307,7 @@ def write_retargeted(
     limb = LimbTriangle(result.head(joint), result.head(elbow), result.head(hand))
     # On a body of other proportions the joint sits elsewhere: from there a limb keeps its way.
     our_place, their_place = limb.joint, splice.head(other_joint)
-    if retarget.match.same_body:
+    if retarget.same_build:
         our_place, their_place = ours.place(base), theirs.place(splice)
 
     def seen(bone: int) -> Floats:
@@ -463,7 +465,8 @@ def _side_retarget(
             return bones, chest, pelvis
 
     (bones, chest, frame), (others, other_chest, other_frame) = map(seen, clips)
-    if same_build(base.skeleton, splice.skeleton, marks):
+    alike = same_build(base.skeleton, splice.skeleton, marks)
+    if alike:
         other_chest, other_frame = laid_over(other_chest, chest), laid_over(other_frame, frame)
     chests, frames = (chest, other_chest), (frame, other_frame)
     if kind.spine:
@@ -481,7 +484,7 @@ def _side_retarget(
     limb = None
     if kind.limb is not None:
         limb = _limb_joints(kind, side, base), _limb_joints(kind, side, splice)
-    found = Retarget(base, splice, tuple(bones), frames, match, limb, None)
+    found = Retarget(base, splice, tuple(bones), frames, match, limb, None, same_build=alike)
     return replace(found, bodies=bodies_of(*clips), upright=True) if asked == "world" else found
 
 

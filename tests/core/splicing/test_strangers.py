@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Skeletons that nobody has tried, whose motion is known beforehand: mapped, spliced, measured."""
+
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from octo_motion.core.rotations import Floats
+from octo_motion.core.splicing.clip.clip import Clip
+from octo_motion.core.splicing.clip.rest_pose import average_pose
+from octo_motion.core.splicing.clip.splice_timing import Timing
+from octo_motion.core.splicing.humanoid.landmarks import LANDMARKS, Landmarks
+from octo_motion.core.splicing.humanoid.mapping import map_skeleton
+from octo_motion.core.splicing.transfer.parts import PARTS
+from octo_motion.core.splicing.transfer.splice import Splice
+from tests.core.splice_bodies import spliced
+from tests.core.stranger_kinds import EXPECTED, KINDS
+from tests.core.strangers import Action, Mover, Stranger, played
+from tests.referee.clip_measures import angle
+
+SILENT = {"numbers"}
+"""Their names say nothing: what was told by shape is said."""
+SPINELESS = {"roblox", "markerless"}
+
+
+def stranger(name: str, action: Action, number: int, frames: int = 60) -> Stranger:
+    """One of a kind, with another rest pose, other axes and units than the one before."""
+    mover, bones = Mover(action, frames), KINDS[name]
+    return (
+        Stranger(mover, bones),
+        Stranger(mover, bones, "x", "A", 0.01, y_up=True),
+        Stranger(mover, bones, "world", "crouching", 0.01, y_up=True),
+        Stranger(mover, bones, "anyhow", "along x", 1.0, seed=number),
+        Stranger(mover, bones, "x", "leaning", 2.54),
+    )[number % 5]
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_all_landmarks_are_found_on(name: str) -> None:
+    first = {(bone.key, bone.side): bone.name for bone in reversed(KINDS[name])}
+    wanted = {
+        landmark: bone
+        for landmark in LANDMARKS
+        if landmark != "spine"
+        and (bone := first.get((landmark.split(".")[0], landmark.partition(".")[2])))
+    } | EXPECTED.get(name, {})
+    for number in range(4):
+        clip = stranger(name, "walk", number, 30).clip
+        found = map_skeleton(clip.skeleton, average_pose(clip))
+        own = {key: found.landmarks.get(key) for key in wanted}
+        assert own == wanted, number
+        assert ("spine" in found.landmarks.bones) == (name not in SPINELESS)
+        assert bool(found.notes) == (name in SILENT), found.notes
+
+
+class Person:
+    """A stranger's clip, mapped, and where its body is."""
+
+    def __init__(self, own: Stranger) -> None:
+        self.mover, self.clip = own.mover, own.clip
+        self.marks: Landmarks = map_skeleton(self.clip.skeleton, average_pose(self.clip)).landmarks
+        self._keys = {bone.name: (bone.key, bone.side) for bone in own.bones}
+        self._turns, self._heads = played(self.clip)
+
+    def row(self, landmark: str) -> int:
+        return self.clip.skeleton.index[self.marks[landmark]]
+
+    def way(self, start: str, end: str) -> Floats:
+        """From joint to joint as the body has them."""
+        ends = (self.mover.place(*self._keys[self.marks[each]]) for each in (end, start))
+        return np.subtract(*ends)
+
+    def segment(self, landmark: str) -> Floats:
+        return self.mover.segment(*self._keys[self.marks[landmark]])
+
+    def segment_in(self, clip: Clip, landmark: str) -> Floats:
+        """How the segment of a bone is turned in another clip of this skeleton."""
+        row = self.row(landmark)
+        axes = self.segment(landmark).transpose(0, 2, 1) @ self._turns[:, row]
+        return played(clip)[0][:, row] @ axes.transpose(0, 2, 1)
+
+
+@cache
+def person(name: str, action: Action, number: int) -> Person:
+    return Person(stranger(name, action, number))
+
+
+def apart(first: Floats, second: Floats) -> float:
+    """Degrees between orientations (frames, 3, 3), at most."""
+    cosine = (np.einsum("nij,nij->n", first, second) - 1.0) / 2.0
+    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)).max()))
+
+
+PAIRS = [(name, number) for number, name in enumerate(sorted(KINDS))]
+
+
+@pytest.mark.parametrize(("name", "number"), PAIRS)
+def test_a_stranger_gives_and_takes_arms_legs_and_head_as_they_are(name: str, number: int) -> None:
+    for onto, source in (
+        (person(name, "walk", number), person("mixamo", "throw", 0)),
+        (person("mixamo", "walk", 0), person(name, "throw", number)),
+    ):
+        for part, body, limbs, end in (
+            ("right_arm", "chest", ("upper_arm.R", "forearm.R", "hand.R"), 15.0),
+            ("legs", "pelvis", ("thigh.L", "shin.L", "foot.L"), 10.0),
+            ("head", "chest", ("neck", "head"), 6.0),
+        ):
+            splice = Splice(PARTS[part], source.clip, Timing(1, 1), source.marks)
+            result = spliced(onto.clip, onto.marks, splice)
+            heads = played(result)[1]
+            laid = onto.mover.turns[body] @ source.mover.turns[body].transpose(0, 2, 1)
+            for upper, lower in pairwise(limbs):
+                # A neck that carries the arms stays where it is; some have none.
+                if upper == "neck" and ("biped, tri" in name or name in SPINELESS):
+                    continue
+                own = heads[:, onto.row(lower)] - heads[:, onto.row(upper)]
+                wanted = np.einsum("nij,nj->ni", laid, source.way(upper, lower))
+                # Two seconds of a throw hold the chest otherwise than a walk does, by up to 4°.
+                limit = 4.0 if part == "right_arm" else 3.0
+                assert angle(own, wanted).max() < limit, (part, upper)
+            last = limbs[-1]
+            off = apart(onto.segment_in(result, last), laid @ source.segment(last))
+            assert off < end, (part, last)
