@@ -13,6 +13,8 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from ..core.errors import OctoMotionError, RigError, WriteError
 from ..core.files import plain_name
+from ..core.phrases import phrase
+from ..ui.language import reported
 from ..ui.locomotion import locomotion_settings
 from ..ui.operator_base import FileOperator
 from ..ui.splicing import splicing_settings
@@ -127,7 +129,10 @@ class OCTO_MOTION_OT_write_job(FileOperator, bpy.types.Operator):
         )
         write_text(path, head + "".join(tables))
         read_job(path, known(), records.report)
-        self.report({"INFO"}, f"'{path.name}' has {len(tables)} shots.")
+        self.report(
+            {"INFO"},
+            reported(phrase("'{path}' has {count} shots.", path=path.name, count=len(tables))),
+        )
 
 
 class OCTO_MOTION_OT_link_shots(FileOperator, bpy.types.Operator):
@@ -169,7 +174,10 @@ class OCTO_MOTION_OT_link_shots(FileOperator, bpy.types.Operator):
                 made[record.name] = taken.actions[0]
         if not made:
             raise OctoMotionError(
-                f"None of the {len(records)} shots has a .blend file with its action.",
+                phrase(
+                    "None of the {count} shots has a .blend file with its action.",
+                    count=len(records),
+                ),
                 "Bake the job, and keep the report where it was written.",
             )
         if SHOTS not in scene:
@@ -177,7 +185,16 @@ class OCTO_MOTION_OT_link_shots(FileOperator, bpy.types.Operator):
         for name, action in made.items():
             # A user of each, for what has none is not saved.
             scene[SHOTS][name] = action
-        self.report({"INFO"}, f"{len(made)} of {len(records)} shots are here as actions.")
+        self.report(
+            {"INFO"},
+            reported(
+                phrase(
+                    "{count} of {total} shots are here as actions.",
+                    count=len(made),
+                    total=len(records),
+                )
+            ),
+        )
 
 
 def draw_in_export_menu(menu: Any, _context: bpy.types.Context) -> None:

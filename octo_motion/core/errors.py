@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The errors that a user can meet: what is wrong, and what to do about it."""
 
+from __future__ import annotations
+
+from .phrases import as_phrase, joined_phrases
+
 
 class OctoMotionError(Exception):
     """Something the user can put right.
@@ -10,9 +14,9 @@ class OctoMotionError(Exception):
     """
 
     def __init__(self, problem: str, remedy: str = "") -> None:
-        super().__init__(f"{problem} {remedy}".strip())
-        self.problem = problem
-        self.remedy = remedy
+        self.problem = as_phrase(problem)
+        self.remedy = as_phrase(remedy)
+        super().__init__(joined_phrases(" ", (self.problem, self.remedy)))
 
 
 class RigError(OctoMotionError):

@@ -8,6 +8,8 @@ import time
 from pathlib import Path
 from typing import Final
 
+from .phrases import phrase
+
 BUSY: Final = {5, 32, 33}
 """Windows' numbers for a file that another program has open: access denied, sharing, lock."""
 _PAUSES: Final = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.6)
@@ -62,11 +64,19 @@ def name_fault(name: str) -> str:
     Where a name need not stand in a path as it is, :func:`blender.files.file_named` takes any.
     """
     if odd := _ODD.search(name):
-        return f"{name!r} has {odd.group()!r}, which not every system takes in the name of a file."
+        return phrase(
+            "{name!r} has {letters!r}, which not every system takes in the name of a file.",
+            name=name,
+            letters=odd.group(),
+        )
     if DEVICES.match(name):
-        return f"'{name}' is the name of a device on Windows."
+        return phrase("'{name}' is the name of a device on Windows.", name=name)
     if len(name.encode()) > LONGEST_PART:
-        return f"'{name}' is longer than the {LONGEST_PART} letters that every system takes."
+        return phrase(
+            "'{name}' is longer than the {longest_part} letters that every system takes.",
+            name=name,
+            longest_part=LONGEST_PART,
+        )
     return ""
 
 

@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from .errors import SettingsError
+from .phrases import as_phrase, phrase
 
 _KEY: Final = "setting"
 
@@ -77,15 +78,25 @@ def check_settings(settings: Any) -> None:
         value, declared = getattr(settings, each.name), each.metadata.get(_KEY)
         if not isinstance(value, float | int | tuple):
             continue
-        label = declared.label if declared else each.name.replace("_", " ").capitalize()
+        label = as_phrase(declared.label if declared else _title(each.name))
         if not np.all(np.isfinite(value)):
-            raise SettingsError(f"{label} is not a number.", "Set it anew.")
+            raise SettingsError(phrase("{label} is not a number.", label=label), "Set it anew.")
         low, high = (declared.low, declared.high) if declared else (None, None)
         if (low is not None and value < low) or (high is not None and value > high):
-            raise SettingsError(f"{label} is {value:g}.", _remedy(low, high))
+            raise SettingsError(
+                phrase("{label} is {value:g}.", label=label, value=value), _remedy(low, high)
+            )
+
+
+def _title(name: str) -> str:
+    return name.replace("_", " ").capitalize()
 
 
 def _remedy(low: float | None, high: float | None) -> str:
     if high is None:
-        return f"Give {low:g} or more."
-    return f"Give {high:g} or less." if low is None else f"Give a value from {low:g} to {high:g}."
+        return phrase("Give {low:g} or more.", low=low)
+    return (
+        phrase("Give {high:g} or less.", high=high)
+        if low is None
+        else phrase("Give a value from {low:g} to {high:g}.", low=low, high=high)
+    )

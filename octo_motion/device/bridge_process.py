@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Final
 
 from ..core.errors import DeviceError, OctoMotionError
+from ..core.phrases import phrase
 from ..core.posing.puppet import Pose
 from ..core.posing.solver import Obstacle, WorldSettings
 from . import messages
@@ -102,7 +103,7 @@ class Bridge:
         except (messages.MessageError, OctoMotionError) as error:
             log.warning("Not taken: %s", error)
             remedy = error.remedy if isinstance(error, OctoMotionError) else ""
-            problem = f"The bridge did not take a message: {error}"
+            problem = phrase("The bridge did not take a message: {error}", error=error)
             self._blender.send(messages.Notice(problem, remedy))
 
     def _take(self, message: messages.Message) -> None:

@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 
 from ..core.errors import DeviceError
+from ..core.phrases import phrase
 from ..core.rotations import Floats
 from ..core.rotations.scalars import subtract
 from .driver import Axes, Kind, Sample, six
@@ -48,7 +49,10 @@ class Response:
             value = getattr(self, each.name)
             if not all(map(isfinite, value if isinstance(value, tuple) else (value,))):
                 raise DeviceError(
-                    f"The device's {each.name.replace('_', ' ')} is not a number.",
+                    phrase(
+                        "The device's {setting} is not a number.",
+                        setting=each.name.replace("_", " "),
+                    ),
                     "Set it to a finite number.",
                 )
         if not all(0.0 <= zone <= 0.9 for zone in self.dead_zone):

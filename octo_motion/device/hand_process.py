@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import Final
 
 from ..core.errors import DeviceError
+from ..core.phrases import phrase
 from . import messages
 from .calibration import Calibration, Phase
 from .driver import DeviceLostError, Driver
@@ -145,7 +146,9 @@ class HandLoop:
             settings.response()
         except messages.MessageError as error:
             self._channel.send(
-                messages.Notice(f"The device's settings were not taken: {error}", "")
+                messages.Notice(
+                    phrase("The device's settings were not taken: {error}", error=error), ""
+                )
             )
             return
         self._settings = settings
@@ -245,7 +248,9 @@ def discovery_of(sources: Sources) -> Discovery:
     try:
         return Discovery(sources)
     except (OSError, OverflowError) as error:
-        problem = DeviceError(f"The network port cannot be used: {error}.", "Choose another one.")
+        problem = DeviceError(
+            phrase("The network port cannot be used: {error}.", error=error), "Choose another one."
+        )
     except DeviceError as error:
         problem = error
     discovery = Discovery(replace(sources, network=None))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from ..core.errors import OctoMotionError
 from . import at_work
+from .language import reported, translated
 from .operator_base import OctoOperator, window_manager
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class ModalJob(OctoOperator):
     def give_up(self, context: bpy.types.Context) -> set[OperatorReturnItems]:
         """What Esc does."""
         self._stop(context)
-        self.report({"INFO"}, self._stopped)  # type: ignore[attr-defined]
+        self.report({"INFO"}, reported(self._stopped))  # type: ignore[attr-defined]
         return {"CANCELLED"}
 
     def take_back(self) -> None:
@@ -117,7 +118,7 @@ class ModalJob(OctoOperator):
 
     def _fail(self, context: bpy.types.Context, error: OctoMotionError) -> set[OperatorReturnItems]:
         self._stop(context)
-        self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
+        self.report({"ERROR"}, reported(error))  # type: ignore[attr-defined]
         return {"CANCELLED"}
 
     def _show(self, context: bpy.types.Context) -> None:
@@ -125,7 +126,7 @@ class ModalJob(OctoOperator):
         if self._job.progress > 0.0:
             window_manager(context).progress_update(self._job.progress)
         if context.workspace is not None:
-            context.workspace.status_text_set(self.status(self._job.progress))
+            context.workspace.status_text_set(translated(self.status(self._job.progress)))
 
     def _tear_down(self, context: bpy.types.Context) -> None:
         """Leave nothing on the screen; safe to call twice."""

@@ -15,6 +15,8 @@ from ..blender.animation import renumber_keys
 from ..blender.rig import active_armature, linked_names
 from ..core.errors import OctoMotionError, RigError
 from ..core.files import plain_name
+from ..core.phrases import as_phrase, phrase
+from .language import hinted, reported
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems
@@ -39,7 +41,7 @@ class OctoOperator:
         """Blender's entry point."""
         found = cls.obstacle(context)
         if found:
-            cls.poll_message_set(found)  # type: ignore[attr-defined]
+            cls.poll_message_set(hinted(found))  # type: ignore[attr-defined]
         return not found
 
     def run(self, context: bpy.types.Context) -> None:
@@ -51,7 +53,7 @@ class OctoOperator:
         try:
             self.run(context)
         except OctoMotionError as error:
-            self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
+            self.report({"ERROR"}, reported(error))  # type: ignore[attr-defined]
             return {"CANCELLED"}
         return {"FINISHED"}
 
@@ -97,7 +99,7 @@ def without_armature(context: bpy.types.Context) -> str:
     try:
         active_armature(context)
     except RigError as error:
-        return str(error).rstrip(".")
+        return as_phrase(error).open_ended()
     return ""
 
 
@@ -151,7 +153,11 @@ class ItemOperator(ListOperator):
         if found := super().obstacle(context):
             return found
         chosen = cls.KIND.active_item(cls.KIND.settings(active_armature(context)))
-        return "" if chosen is not None else f"Choose {cls.KIND.one} in the list first"
+        return (
+            ""
+            if chosen is not None
+            else phrase("Choose {one} in the list first", one=as_phrase(cls.KIND.one))
+        )
 
 
 class RemoveOperator(ItemOperator):
@@ -162,7 +168,8 @@ class RemoveOperator(ItemOperator):
         name = kind.active_item(settings).name
         if name in linked_names(settings, kind.items):
             raise RigError(
-                f"'{name}' is in the linked file and cannot be removed here.", kind.instead
+                phrase("'{name}' is in the linked file and cannot be removed here.", name=name),
+                kind.instead,
             )
         items, number = getattr(settings, kind.items), getattr(settings, kind.active)
         behind = {each: each - 1 for each in range(number + 1, len(items))}
@@ -194,8 +201,15 @@ class MoveOperator(ItemOperator):
         name = kind.active_item(settings).name
         if name in linked_names(settings, kind.items):
             raise RigError(
-                f"'{name}' is in the linked file, where the order of its {kind.items} is set.",
-                f"Move {kind.items} that were added in this file, or change the order there.",
+                phrase(
+                    "'{name}' is in the linked file, where the order of its {items} is set.",
+                    name=name,
+                    items=as_phrase(kind.items),
+                ),
+                phrase(
+                    "Move {items} that were added in this file, or change the order there.",
+                    items=as_phrase(kind.items),
+                ),
             )
         number, target = getattr(settings, kind.active), self._target(settings)
         getattr(settings, kind.items).move(number, target)
@@ -241,7 +255,7 @@ class ArmaturePresetAdd(AddPresetBase):
     def poll(cls, context: bpy.types.Context) -> bool:
         found = without_armature(context)
         if found:
-            cast("Any", cls).poll_message_set(found)
+            cast("Any", cls).poll_message_set(hinted(found))
         return not found
 
     @staticmethod

@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
-from textwrap import wrap
 from typing import Any, ClassVar, Final, cast
+from unicodedata import east_asian_width
 
 import bpy
 
 from ..blender.rig import active_armature
 from ..core.errors import RigError
+from .language import translated
 from .tool import tool_of
 
 _CHARACTER: Final = 6.5
@@ -20,6 +22,12 @@ _MARGIN: Final = 80.0
 _USUAL_WIDTH: Final = 280.0
 _FEWEST: Final = 16
 """Letters in a line, however narrow the sidebar."""
+_UNBROKEN: Final = re.compile(
+    r"[\u3001-\u9fff\uff00-\uffef](?:[\u30fc\u3041\u3043\u3045\u3047\u3049\u3063\u3083\u3085\u3087"
+    r"\u30a1\u30a3\u30a5\u30a7\u30a9\u30c3\u30e3\u30e5\u30e7]|[\u3001\u3002\u300d\uff09\uff1a])*"
+    r"|[^\s\u3001-\u9fff\uff00-\uffef]+\s*|\s+"
+)
+"""Words with what follows them, and Japanese letters with those that must not begin a line."""
 
 
 def armature_in(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -37,8 +45,23 @@ def draw_sentence(layout: Any, context: bpy.types.Context, text: str, icon: str)
     width = region.width / scale if region is not None else _USUAL_WIDTH
     characters = max(int((width - _MARGIN) / _CHARACTER), _FEWEST)
     column = layout.column(align=True)
-    for number, line in enumerate(wrap(text, characters)):
-        column.label(text=line, icon="BLANK1" if number else icon)
+    for number, line in enumerate(lines_of(translated(text), characters)):
+        column.label(text=line, icon="BLANK1" if number else icon, translate=False)
+
+
+def lines_of(text: str, characters: int) -> list[str]:
+    """A text in lines of so many letters at most. Japanese ones take the room of two, and a line
+    may end between them, but for what must not begin one.
+    """
+    lines, room = [""], 0
+    for part in _UNBROKEN.findall(text):
+        size = sum(2 if east_asian_width(each) in "WF" else 1 for each in part.rstrip())
+        if room + size > characters and lines[-1]:
+            lines.append("")
+            room = 0
+        lines[-1] += part
+        room += size + len(part) - len(part.rstrip())
+    return [line.rstrip() for line in lines]
 
 
 def draw_list(

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import bpy
 from bpy.app.handlers import persistent
 
-from . import at_work, findable, locomotion, posing, splicing
+from . import at_work, findable, language, locomotion, posing, splicing
 from .declared_settings import PointerProperty, make_overridable
 from .locomotion import OCTO_MOTION_PG_contact, OCTO_MOTION_PG_locomotion
 from .posing import OCTO_MOTION_PG_posing
@@ -88,6 +88,7 @@ CLASSES: tuple[type, ...] = (
 def _steps() -> list[Step]:
     """What is done, and how each of it is undone."""
     return [
+        Step(language.register, language.unregister),
         *(registered(each) for each in CLASSES),
         Step(_give_settings, _take_settings),
         *locomotion.STEPS,

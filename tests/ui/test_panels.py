@@ -54,7 +54,7 @@ class Layout:
         check("split", arguments)
         return Layout(self.drawn)
 
-    def label(self, *, text: str, icon: str = "NONE") -> None:
+    def label(self, *, text: str, icon: str = "NONE", translate: bool = True) -> None:  # noqa: ARG002
         assert icon in ICONS
         self.drawn.append(text)
 

@@ -25,6 +25,7 @@ from ...core.keyframes import (
     RigChannels,
     rotation_property,
 )
+from ...core.phrases import phrase
 from ...core.rotations import IDENTITY, Floats, from_matrix, from_mode_values
 from ..rig import ALIGNED, armature_data, pose_of
 
@@ -68,7 +69,11 @@ def writable_object(obj: bpy.types.Object) -> None:
     # opened again. Of a local object with linked armature data, and of an editable override, the
     # action is saved.
     if obj.library is not None:
-        problem = f"'{obj.name}' is linked from '{obj.library.name}' and is read-only here."
+        problem = phrase(
+            "'{obj}' is linked from '{library}' and is read-only here.",
+            obj=obj.name,
+            library=obj.library.name,
+        )
         if all(scene.library is not None for scene in obj.users_scene):
             raise WriteError(
                 problem,
@@ -78,18 +83,19 @@ def writable_object(obj: bpy.types.Object) -> None:
         raise WriteError(problem, "Make a library override (Object > Library Override > Make).")
     if obj.override_library is not None and obj.override_library.is_system_override:
         raise WriteError(
-            f"'{obj.name}' is a library override that is not editable.",
+            phrase("'{obj}' is a library override that is not editable.", obj=obj.name),
             "Make it editable: select it and choose Object > Library Override > Make.",
         )
     data = obj.animation_data
     if data is not None and data.use_tweak_mode:
         raise WriteError(
-            f"'{obj.name}' is in the tweak mode of the NLA editor.",
+            phrase("'{obj}' is in the tweak mode of the NLA editor.", obj=obj.name),
             "Leave tweak mode there (Tab) and try again.",
         )
     if data is not None and data.is_property_readonly("action"):
         raise WriteError(
-            f"The animation of '{obj.name}' is read-only.", "Choose an object that can be edited."
+            phrase("The animation of '{obj}' is read-only.", obj=obj.name),
+            "Choose an object that can be edited.",
         )
 
 
@@ -822,7 +828,11 @@ def _pose_bones(armature: bpy.types.Object, bones: Sequence[str]) -> list[bpy.ty
     missing = [name for name in bones if name not in found]
     if missing:
         raise RigError(
-            f"'{armature.name}' has no bone '{missing[0]}' in its pose.",
+            phrase(
+                "'{armature}' has no bone '{missing}' in its pose.",
+                armature=armature.name,
+                missing=missing[0],
+            ),
             "Leave edit mode, or detect the arms again.",
         )
     return [found[name] for name in bones]
@@ -849,7 +859,10 @@ def _parent_turn(obj: bpy.types.Object) -> Floats:
     # The frame may scale, shear and mirror: its polar decomposition.
     left, sizes, right = np.linalg.svd(parent_frame(obj)[:3, :3])
     if sizes[-1] < 1e-6 * sizes[0]:
-        raise RigError(f"The parent of '{obj.name}' is flat or has no size.", "Repair its scale.")
+        raise RigError(
+            phrase("The parent of '{obj}' is flat or has no size.", obj=obj.name),
+            "Repair its scale.",
+        )
     turn = left @ right
     # Blender takes a mirrored frame's axes the other way round: so reads its matrix_world.
     return from_matrix(turn if np.linalg.det(turn) > 0.0 else -turn)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from ...core.errors import ClipError
 from ...core.keyframes import Channel, RigChannels, rotation_property
+from ...core.phrases import phrase
 from ...core.rotations import (
     IDENTITY,
     Floats,
@@ -117,7 +118,10 @@ def read_clip(
     if action is None:
         tracks = data is not None and any(track.strips for track in data.nla_tracks)
         if not (visual and tracks):
-            raise ClipError(f"'{armature.name}' has no action.", "Give it one, or import a clip.")
+            raise ClipError(
+                phrase("'{armature}' has no action.", armature=armature.name),
+                "Give it one, or import a clip.",
+            )
         times = _checked_frames(_track_range(armature) if frames is None else frames, frames)
         return _shown_clip(armature, skeleton, armature.name, times, per_second)
     return _action_clip(
@@ -337,7 +341,11 @@ def _action_clip(
     curves = _curves_of(action, slot, skeleton)
     if not curves:
         raise ClipError(
-            f"Action '{action.name}' has no keys for the bones of '{armature.name}'.",
+            phrase(
+                "Action '{action}' has no keys for the bones of '{armature}'.",
+                action=action.name,
+                armature=armature.name,
+            ),
             "Choose an action made for this armature.",
         )
     times = _checked_frames(_action_range(action, curves) if frames is None else frames, frames)
@@ -350,7 +358,7 @@ def _action_clip(
     world, own = _object_motion(armature, curves, times)
     if not all(np.isfinite(each).all() for each in (rotations, locations, world)):
         raise ClipError(
-            f"Action '{action.name}' has keys that are no finite numbers.",
+            phrase("Action '{action}' has keys that are no finite numbers.", action=action.name),
             "Repair or delete them, or choose another action.",
         )
     _check_scale(armature, world)
@@ -441,13 +449,19 @@ def _check_shown(armature: bpy.types.Object) -> None:
     assert layer is not None
     if armature.hide_viewport or not _is_within(armature, layer.layer_collection):
         raise ClipError(
-            f"'{armature.name}' is not in the scene, or disabled in viewports: it cannot be read "
-            "as shown.",
+            phrase(
+                "'{armature}' is not in the scene, or disabled in viewports: it cannot be read "
+                "as shown.",
+                armature=armature.name,
+            ),
             "Enable it and its collection in the Outliner, or turn off As Shown.",
         )
     if armature_data(armature).pose_position == "REST":
         raise ClipError(
-            f"'{armature.name}' is in its rest position: it cannot be read as shown.",
+            phrase(
+                "'{armature}' is in its rest position: it cannot be read as shown.",
+                armature=armature.name,
+            ),
             "Choose Pose Position in its armature properties, or turn off As Shown.",
         )
 
@@ -483,15 +497,26 @@ def slot_of(armature: bpy.types.Object, action: bpy.types.Action) -> bpy.types.A
     if fitting:
         names = ", ".join(f"'{slot.name_display}'" for slot in fitting)
         raise ClipError(
-            f"Action '{action.name}' has several slots that fit '{armature.name}': {names}.",
+            phrase(
+                "Action '{action}' has several slots that fit '{armature}': {names}.",
+                action=action.name,
+                armature=armature.name,
+                names=names,
+            ),
             "Assign the action to the armature and choose its slot in the Action editor.",
         )
     if next(curves_of(action), None) is not None:
         raise ClipError(
-            f"Action '{action.name}' has no slot for '{armature.name}'.",
+            phrase(
+                "Action '{action}' has no slot for '{armature}'.",
+                action=action.name,
+                armature=armature.name,
+            ),
             "Choose an action made for this armature.",
         )
-    raise ClipError(f"Action '{action.name}' is empty.", "Choose an action that has keys.")
+    raise ClipError(
+        phrase("Action '{action}' is empty.", action=action.name), "Choose an action that has keys."
+    )
 
 
 def _curves_of(action: bpy.types.Action, slot: bpy.types.ActionSlot, skeleton: Skeleton) -> _Curves:
@@ -521,13 +546,18 @@ def _action_range(action: bpy.types.Action, curves: _Curves) -> Floats:
         ]
         if not ranges:
             raise ClipError(
-                f"Action '{action.name}' has no keys, so no beginning and no end.",
+                phrase(
+                    "Action '{action}' has no keys, so no beginning and no end.", action=action.name
+                ),
                 "Give it a manual frame range.",
             )
         start, end = min(each[0] for each in ranges), max(each[1] for each in ranges)
     if end - start < 0.5:
         raise ClipError(
-            f"Action '{action.name}' has only one frame: it is a pose, not a motion.",
+            phrase(
+                "Action '{action}' has only one frame: it is a pose, not a motion.",
+                action=action.name,
+            ),
             "Choose an action with keys at two frames or more.",
         )
     return _whole_frames(start, end)
@@ -551,7 +581,10 @@ def _track_range(armature: bpy.types.Object) -> Floats:
     assert data is not None
     strips = [strip for track in data.nla_tracks for strip in track.strips if not strip.mute]
     if not strips:
-        raise ClipError(f"All NLA strips of '{armature.name}' are muted.", "Unmute one.")
+        raise ClipError(
+            phrase("All NLA strips of '{armature}' are muted.", armature=armature.name),
+            "Unmute one.",
+        )
     return _whole_frames(
         min(strip.frame_start for strip in strips), max(strip.frame_end for strip in strips)
     )
@@ -671,7 +704,11 @@ def _check_inheritance(armature: bpy.types.Object, skeleton: Skeleton, scaled: n
         bone = bones[number]
         if bone.inherit_scale != "FULL" or not bone.use_inherit_rotation:
             raise ClipError(
-                f"'{armature.name}' scales bones above '{bone.name}', which does not inherit it.",
+                phrase(
+                    "'{armature}' scales bones above '{bone}', which does not inherit it.",
+                    armature=armature.name,
+                    bone=bone.name,
+                ),
                 "Turn on As Shown: the motion is then read as the scene shows it.",
             )
         bones_beneath[number] = True
@@ -715,14 +752,20 @@ def _check_scale(armature: bpy.types.Object, world: Floats) -> None:
     sizes = np.linalg.norm(world[:, :3, :3], axis=1)
     mean = sizes.mean()
     if mean == 0.0 or not np.isfinite(world).all():
-        raise ClipError(f"'{armature.name}' has no size.", "Repair the object's scale.")
+        raise ClipError(
+            phrase("'{armature}' has no size.", armature=armature.name),
+            "Repair the object's scale.",
+        )
     if (np.linalg.det(world[:, :3, :3]) < 0.0).any():
         raise ClipError(
-            f"'{armature.name}' is mirrored by a negative scale.",
+            phrase("'{armature}' is mirrored by a negative scale.", armature=armature.name),
             "Apply its scale (Object > Apply > Scale).",
         )
     if np.abs(sizes / mean - 1.0).max() > _ROUNDING:
         raise ClipError(
-            f"The scale of '{armature.name}' is not the same in all directions and at all frames.",
+            phrase(
+                "The scale of '{armature}' is not the same in all directions and at all frames.",
+                armature=armature.name,
+            ),
             "Give it one scale: apply it (Object > Apply > Scale), and remove its scale keys.",
         )

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...core.errors import ClipError
 from ...core.keyframes import BezierKeys, segment_values
+from ...core.phrases import phrase
 from ...core.rotations import Floats
 from .actions import curves_of, enum_value, key_points
 
@@ -230,7 +231,9 @@ def lasting(action: bpy.types.Action, frames: int) -> bpy.types.Action:
     start, end = action.frame_range
     if end - start < 0.5:
         raise ClipError(
-            f"Action '{action.name}' has only one frame: it cannot be repeated.",
+            phrase(
+                "Action '{action}' has only one frame: it cannot be repeated.", action=action.name
+            ),
             "Choose an action with keys at two frames or more.",
         )
     copy = action.copy()

@@ -26,6 +26,7 @@ from ...core.keyframes import (
     reduce_keys,
     rotation_property,
 )
+from ...core.phrases import phrase
 from ...core.rotations import Floats
 from ..rig import carrying_axes
 from .actions import (
@@ -204,7 +205,10 @@ class PoseKeys:
         beneath = any(not track.mute for track in data.nla_tracks)
         if beneath and (data.action_blend_type != "REPLACE" or data.action_influence < 1.0):
             raise WriteError(
-                f"The action of '{armature.name}' adds to its NLA tracks, or is blended with them.",
+                phrase(
+                    "The action of '{armature}' adds to its NLA tracks, or is blended with them.",
+                    armature=armature.name,
+                ),
                 "Let the keys go to a new layer, or set the action to Replace in the NLA editor.",
             )
 
@@ -434,7 +438,10 @@ def _give_action(
     elif (target == "LAYER" or blends) and action is not None and slot is not None:
         if not data.use_nla:
             raise WriteError(
-                f"The NLA of '{armature.name}' is switched off: no layer would be seen.",
+                phrase(
+                    "The NLA of '{armature}' is switched off: no layer would be seen.",
+                    armature=armature.name,
+                ),
                 "Switch it on in the NLA editor, or let the keys go to another action.",
             )
         before.track = _push_down(data, action, slot)
@@ -557,7 +564,7 @@ def _chosen_action(number: int) -> bpy.types.Action:
 def _writable_action(action: bpy.types.Action) -> None:
     if action.library is not None or not action.is_editable:
         raise WriteError(
-            f"Action '{action.name}' is linked and read-only.",
+            phrase("Action '{action}' is linked and read-only.", action=action.name),
             "Let the keys go to a copy, or to a layer.",
         )
 

@@ -18,6 +18,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import ClipError
+from ...core.phrases import phrase
 from ...core.rotations import Floats
 from .actions import acting_curves
 from .poses import AT_REST
@@ -168,7 +169,7 @@ def assigned(
         return
     if data.is_property_readonly("action"):
         raise ClipError(
-            f"'{armature.name}' is in the tweak mode of the NLA editor.",
+            phrase("'{armature}' is in the tweak mode of the NLA editor.", armature=armature.name),
             "Leave tweak mode there (Tab) and try again.",
         )
     with _pose_kept(armature):

@@ -6,6 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ...core.errors import WriteError
+from ...core.phrases import phrase
 from .actions import MARK, curves_of, is_setting
 
 _TRACK = "track"
@@ -23,7 +24,10 @@ def check_layers(armature: bpy.types.Object) -> None:
     data = armature.animation_data
     if data is not None and not data.use_nla:
         raise WriteError(
-            f"The NLA of '{armature.name}' is switched off: no layer would be seen.",
+            phrase(
+                "The NLA of '{armature}' is switched off: no layer would be seen.",
+                armature=armature.name,
+            ),
             "Switch it on in the NLA editor, or choose New Action as the Result.",
         )
 

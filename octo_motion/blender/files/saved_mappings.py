@@ -8,6 +8,7 @@ from typing import Final
 
 from ...core.errors import RigError
 from ...core.files import read_text
+from ...core.phrases import phrase
 from ...core.splicing.humanoid import SavedMapping, damaged_mapping, mapping_from_json
 from .user_files import (
     LONGEST_NAME,
@@ -48,7 +49,7 @@ def load_mapping(name: str) -> SavedMapping:
         RigError: there is none, or its file is damaged.
     """
     if not name or not _path(name).is_file():
-        raise RigError(f"There is no saved mapping '{name}'.", _choice())
+        raise RigError(phrase("There is no saved mapping '{name}'.", name=name), _choice())
     found = _load(name)
     if isinstance(found, RigError):
         raise found
@@ -67,12 +68,14 @@ def save_mapping(mapping: SavedMapping, *, overwrite: bool = False) -> Path:
         raise RigError("The mapping has no name.", "Give it one.")
     if len(name) > LONGEST_NAME:
         raise RigError(
-            f"The mapping's name has {len(name)} letters.", f"Use {LONGEST_NAME} at most."
+            phrase("The mapping's name has {count} letters.", count=len(name)),
+            phrase("Use {longest_name} at most.", longest_name=LONGEST_NAME),
         )
     path = _path(name)
     if path.exists() and not overwrite:
         raise RigError(
-            f"There is a mapping '{name}' already.", "Choose another name, or overwrite."
+            phrase("There is a mapping '{name}' already.", name=name),
+            "Choose another name, or overwrite.",
         )
     _folder(create=True)
     write_whole(path, mapping.to_json())
@@ -88,7 +91,7 @@ def remove_mapping(name: str) -> None:
     """
     path = _path(name)
     if not name or not path.is_file():
-        raise RigError(f"There is no saved mapping '{name}'.", _choice())
+        raise RigError(phrase("There is no saved mapping '{name}'.", name=name), _choice())
     try:
         path.unlink()
     except OSError as error:
@@ -105,7 +108,7 @@ def _path(name: str) -> Path:
 
 def _choice() -> str:
     names = mapping_names()
-    return f"Choose one of {', '.join(names)}." if names else "Save one first."
+    return phrase("Choose one of {names}.", names=", ".join(names)) if names else "Save one first."
 
 
 def _load(name: str) -> SavedMapping | RigError:
@@ -116,7 +119,7 @@ def _load(name: str) -> SavedMapping | RigError:
         if path not in _read or _read[path][0] != written:
             _read[path] = written, _parsed(read_text(path), name)
     except (OSError, UnicodeDecodeError) as error:
-        reason = (isinstance(error, OSError) and error.strerror) or "it is not text"
+        reason = (isinstance(error, OSError) and error.strerror) or phrase("it is not text")
         return damaged_mapping(name, reason)
     return _read[path][1]
 

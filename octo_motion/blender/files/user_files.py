@@ -23,6 +23,7 @@ from ...core.locomotion.gait import (
     gait_to_json,
     renamed_gait,
 )
+from ...core.phrases import phrase
 from ...device.calibration import Calibration
 from ...device.driver import six
 
@@ -41,7 +42,9 @@ def own_folder(name: str = "", *, create: bool = False) -> Path:
             folder = os.path.join("presets", "octo_motion", name)  # noqa: PTH118 - Blender's way
             path = bpy.utils.user_resource("SCRIPTS", path=folder, create=create)
     except OSError as error:
-        raise unwritable(f"the folder for {name or 'settings'}", error) from error
+        raise unwritable(
+            phrase("the folder for {name}", name=name or phrase("settings")), error
+        ) from error
     return Path(path)
 
 
@@ -67,10 +70,14 @@ def unwritable(what: str, error: OSError) -> WriteError:
     """The error that says so."""
     if getattr(error, "winerror", None) in BUSY:
         return WriteError(
-            f"{what} is protected, or open in another program.", "Close it there, and try again."
+            phrase("{what} is protected, or open in another program.", what=what),
+            "Close it there, and try again.",
         )
     reason = error.strerror or type(error).__name__
-    return WriteError(f"Octo Motion cannot write {what}: {reason}.", "Choose another place.")
+    return WriteError(
+        phrase("Octo Motion cannot write {what}: {reason}.", what=what, reason=reason),
+        "Choose another place.",
+    )
 
 
 # --- The user's own gaits: JSON files in the folder that Blender keeps for the extension ----------
@@ -120,12 +127,18 @@ def load_gait(name: str) -> GaitTable:
     """
     built_in = gait_presets()
     if not name:
-        raise GaitError("No gait is chosen.", f"Choose one of {', '.join(gait_names())}.")
+        raise GaitError(
+            "No gait is chosen.",
+            phrase("Choose one of {names}.", names=", ".join(gait_names())),
+        )
     if name in built_in:
         return built_in[name]
     path = _path_of(name)
     if not path.is_file():
-        raise GaitError(f"There is no gait '{name}'.", f"Choose one of {', '.join(gait_names())}.")
+        raise GaitError(
+            phrase("There is no gait '{name}'.", name=name),
+            phrase("Choose one of {names}.", names=", ".join(gait_names())),
+        )
     return renamed_gait(read_gait_file(path), name)
 
 
@@ -140,12 +153,20 @@ def save_gait(table: GaitTable, *, overwrite: bool = False) -> Path:
     if not name.strip():
         raise GaitError("The gait has no name.", "Give it one.")
     if len(name) > LONGEST_NAME:
-        raise GaitError(f"The gait's name has {len(name)} letters.", f"Use {LONGEST_NAME} at most.")
+        raise GaitError(
+            phrase("The gait's name has {count} letters.", count=len(name)),
+            phrase("Use {longest_name} at most.", longest_name=LONGEST_NAME),
+        )
     if name in gait_presets():
-        raise GaitError(f"The gait '{name}' comes with Octo Motion.", "Choose another name.")
+        raise GaitError(
+            phrase("The gait '{name}' comes with Octo Motion.", name=name), "Choose another name."
+        )
     path = _path_of(name)
     if path.exists() and not overwrite:
-        raise GaitError(f"There is a gait '{name}' already.", "Choose another name, or overwrite.")
+        raise GaitError(
+            phrase("There is a gait '{name}' already.", name=name),
+            "Choose another name, or overwrite.",
+        )
     user_folder(create=True)
     write_gait(table, path)
     return path
@@ -159,10 +180,14 @@ def remove_gait(name: str) -> None:
         WriteError: the file cannot be deleted.
     """
     if name in gait_presets():
-        raise GaitError(f"The gait '{name}' comes with Octo Motion.", "It cannot be removed.")
+        raise GaitError(
+            phrase("The gait '{name}' comes with Octo Motion.", name=name), "It cannot be removed."
+        )
     path = _path_of(name)
     if not name or not path.is_file():
-        raise GaitError(f"There is no saved gait '{name}'.", "Choose one that you have saved.")
+        raise GaitError(
+            phrase("There is no saved gait '{name}'.", name=name), "Choose one that you have saved."
+        )
     try:
         path.unlink()
     except OSError as error:
@@ -178,9 +203,10 @@ def read_gait_file(path: Path) -> GaitTable:
     try:
         text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
-        reason = (isinstance(error, OSError) and error.strerror) or "it is not text"
+        reason = (isinstance(error, OSError) and error.strerror) or phrase("it is not text")
         raise GaitError(
-            f"'{path.name}' cannot be read: {reason}.", "Choose a gait file."
+            phrase("'{path}' cannot be read: {reason}.", path=path.name, reason=reason),
+            "Choose a gait file.",
         ) from error
     return gait_from_json(text, f"'{path.name}'")
 

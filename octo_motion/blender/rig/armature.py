@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ...core.content_cache import ContentCache, content_key
 from ...core.errors import RigError, WriteError
 from ...core.locomotion.rig import ArmSkin, arm_skin, joint_positions, nearest_bones
+from ...core.phrases import phrase
 from ...core.rotations import Floats
 from ...core.skeleton import Skeleton
 from .. import versions
@@ -41,7 +42,9 @@ def active_armature(context: bpy.types.Context) -> bpy.types.Object:
         return active
     armature = active.find_armature() or _marked_armature(active) or _on_route(active, context)
     if armature is None:
-        raise RigError(f"'{active.name}' is not an armature.", "Select an armature.")
+        raise RigError(
+            phrase("'{active}' is not an armature.", active=active.name), "Select an armature."
+        )
     return armature
 
 
@@ -80,7 +83,10 @@ def armature_data(armature: bpy.types.Object) -> bpy.types.Armature:
     """
     data = armature.data
     if not isinstance(data, bpy.types.Armature):
-        raise RigError(f"'{armature.name}' is not an armature.", "Select an armature.")
+        raise RigError(
+            phrase("'{armature}' is not an armature.", armature=armature.name),
+            "Select an armature.",
+        )
     return data
 
 
@@ -95,7 +101,8 @@ def pose_of(armature: bpy.types.Object) -> bpy.types.Pose:
         bpy.context.view_layer.update()
     if armature.pose is None:
         raise RigError(
-            f"'{armature.name}' has no pose yet.", "Put it into a scene and leave edit mode."
+            phrase("'{armature}' has no pose yet.", armature=armature.name),
+            "Put it into a scene and leave edit mode.",
         )
     return armature.pose
 
@@ -112,13 +119,17 @@ def read_skeleton(armature: bpy.types.Object) -> Skeleton:
         armature.update_from_editmode()
     bones = list(data.bones)
     if not bones:
-        raise RigError(f"'{armature.name}' has no bones.", "Add bones, or choose another armature.")
+        raise RigError(
+            phrase("'{armature}' has no bones.", armature=armature.name),
+            "Add bones, or choose another armature.",
+        )
     index = {bone.name: number for number, bone in enumerate(bones)}
     lengths = np.array([bone.length for bone in bones])
     matrices = np.array([bone.matrix_local for bone in bones], dtype=np.float64)
     if not np.isfinite(matrices).all():
         raise RigError(
-            f"'{armature.name}' has bones at undefined positions.", "Repair its rest pose."
+            phrase("'{armature}' has bones at undefined positions.", armature=armature.name),
+            "Repair its rest pose.",
         )
     driven = _driven_bones(armature)
     weighted = {group.name for item in deformed_meshes(armature) for group in item.vertex_groups}
@@ -169,18 +180,24 @@ def even_scale(armature: bpy.types.Object) -> float:
     sizes = np.linalg.norm(matrix, axis=0)
     name = f"'{armature.name}'"
     if not np.isfinite(matrix).all() or sizes.min() <= 1e-9 * max(1.0, sizes.max()):
-        raise RigError(f"{name} has no size.", "Give it a scale greater than zero.")
+        raise RigError(
+            phrase("{name} has no size.", name=name), "Give it a scale greater than zero."
+        )
     if sizes.max() - sizes.min() > _EVEN * sizes.max():
         shown = ", ".join(f"{size:.4g}" for size in sizes)
         raise RigError(
-            f"{name} is scaled unequally ({shown}).", "Apply its scale (Object > Apply > Scale)."
+            phrase("{name} is scaled unequally ({shown}).", name=name, shown=shown),
+            "Apply its scale (Object > Apply > Scale).",
         )
     axes = matrix / sizes
     if np.abs(axes.T @ axes - np.eye(3)).max() > _EVEN:
-        raise RigError(f"{name} is sheared by its parent.", "Apply the parent's scale.")
+        raise RigError(
+            phrase("{name} is sheared by its parent.", name=name), "Apply the parent's scale."
+        )
     if np.linalg.det(axes) < 0.0:
         raise RigError(
-            f"{name} is mirrored by a negative scale.", "Apply its scale (Object > Apply > Scale)."
+            phrase("{name} is mirrored by a negative scale.", name=name),
+            "Apply its scale (Object > Apply > Scale).",
         )
     return float(sizes.mean())
 
@@ -299,14 +316,19 @@ def require_editable(armature: bpy.types.Object) -> None:
     armature_data(armature)
     if armature.library is not None:
         raise WriteError(
-            f"'{armature.name}' is linked from '{armature.library.name}': its settings are "
-            "read-only here.",
+            phrase(
+                "'{armature}' is linked from '{library}': its settings are read-only here.",
+                armature=armature.name,
+                library=armature.library.name,
+            ),
             "Make a library override (Object > Library Override > Make).",
         )
     override = armature.override_library
     if override is not None and override.is_system_override:
         raise WriteError(
-            f"'{armature.name}' is a library override that is not editable.",
+            phrase(
+                "'{armature}' is a library override that is not editable.", armature=armature.name
+            ),
             "Make it editable: select it and choose Object > Library Override > Make.",
         )
 
@@ -348,7 +370,9 @@ def _pose_bones(armature: bpy.types.Object, names: Iterable[str]) -> list[bpy.ty
     for name in names:
         bone = bones.get(name)
         if bone is None:
-            raise RigError(f"The armature has no bone '{name}'.", "Detect the arms again.")
+            raise RigError(
+                phrase("The armature has no bone '{name}'.", name=name), "Detect the arms again."
+            )
         found.append(bone)
     return found
 

@@ -15,6 +15,7 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ...core.errors import WriteError
+from ...core.phrases import phrase
 from ...core.posing.control_fit import ControlFit
 from ...core.posing.puppet import SIZE, Pose, closed, turned_bodies
 from ...core.rotations import Floats, conjugate, rotate
@@ -113,7 +114,11 @@ class ControlledPuppet(Puppet):
             return ""
         body = int(np.argmax(off))
         far = float(off.max()) * self._size
-        return f"{self.figure.names[body]} is {far:.3g} off: its controls do not reach"
+        return phrase(
+            "{name} is {far:.3g} off: its controls do not reach",
+            name=self.figure.names[body],
+            far=far,
+        )
 
     def local(self, pose: Pose) -> tuple[Floats, Floats]:  # noqa: ARG002
         """Of bones that something else moves no rotation could be recorded.
@@ -122,7 +127,9 @@ class ControlledPuppet(Puppet):
             WriteError: always.
         """
         raise WriteError(
-            f"'{self.name}' is posed through its controls: a drag cannot be recorded.",
+            phrase(
+                "'{name}' is posed through its controls: a drag cannot be recorded.", name=self.name
+            ),
             "Key its poses with K.",
         )
 

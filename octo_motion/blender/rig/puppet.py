@@ -13,6 +13,7 @@ import numpy as np
 from mathutils import Quaternion, Vector
 
 from ...core.errors import RigError
+from ...core.phrases import phrase
 from ...core.posing.puppet import Figure, Pose
 from ...core.rotations import Floats, conjugate, from_matrix, multiply, rotate
 from .armature import carrying_axes, even_scale, set_rotation
@@ -48,7 +49,9 @@ class Puppet:
         """
         found = self.found()
         if armature_bones(found) != self._bones:
-            raise RigError(f"The bones of '{self.name}' have changed.", "Start posing again.")
+            raise RigError(
+                phrase("The bones of '{name}' have changed.", name=self.name), "Start posing again."
+            )
         return found
 
     def found(self) -> bpy.types.Object:
@@ -62,7 +65,10 @@ class Puppet:
             everything = (each for each in bpy.data.objects if each.session_uid == self._number)
             found = next(everything, None)
         if found is None or found.pose is None:
-            raise RigError(f"'{self.name}' is gone.", "Start posing again with another armature.")
+            raise RigError(
+                phrase("'{name}' is gone.", name=self.name),
+                "Start posing again with another armature.",
+            )
         self.name = found.name
         return found
 

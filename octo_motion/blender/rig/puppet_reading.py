@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import RigError, WriteError
+from ...core.phrases import phrase
 from ...core.posing.puppet import (
     BODY,
     FOLLOW,
@@ -98,11 +99,15 @@ class PuppetRig:
         """
         number = self.skeleton.index.get(bone)
         if number is None:
-            raise RigError(f"'{armature}' has no bone '{bone}'.", "Check its name.")
+            raise RigError(
+                phrase("'{armature}' has no bone '{bone}'.", armature=armature, bone=bone),
+                "Check its name.",
+            )
         body = self.roles.follows[number]
         if body < 0:
             raise RigError(
-                f"The bone '{bone}' is no limb of the puppet.", "Choose one that it carries."
+                phrase("The bone '{bone}' is no limb of the puppet.", bone=bone),
+                "Choose one that it carries.",
             )
         return body
 
@@ -121,7 +126,7 @@ def read_rig(armature: bpy.types.Object, *, smallest: float = SMALLEST) -> Puppe
         bpy.context.view_layer.update()
     if armature_data(armature).pose_position == "REST":
         raise RigError(
-            f"'{armature.name}' is shown at rest, whatever its pose is.",
+            phrase("'{armature}' is shown at rest, whatever its pose is.", armature=armature.name),
             "Set its data to Pose Position (Properties > Data > Skeleton).",
         )
     scale = even_scale(armature)
@@ -138,7 +143,12 @@ def read_rig(armature: bpy.types.Object, *, smallest: float = SMALLEST) -> Puppe
     roles, needs = _roles(armature, skeleton, facts)
     if len(roles.bodies) > MOST_LIMBS:
         raise RigError(
-            f"'{armature.name}' has {len(roles.bodies)} limbs, more than {MOST_LIMBS}.",
+            phrase(
+                "'{armature}' has {count} limbs, more than {most_limbs}.",
+                armature=armature.name,
+                count=len(roles.bodies),
+                most_limbs=MOST_LIMBS,
+            ),
             "Raise Smallest Bone, or mark bones that are to follow.",
         )
     bodies = list(roles.bodies)
@@ -245,7 +255,7 @@ def posed_bones(armature: bpy.types.Object, scale: float) -> PosedBones:
     matrices = buffer.reshape(count, 4, 4).transpose(0, 2, 1).astype(np.float64)
     if not np.isfinite(matrices).all():
         raise RigError(
-            f"'{armature.name}' has bones posed at undefined positions.",
+            phrase("'{armature}' has bones posed at undefined positions.", armature=armature.name),
             "Clear their transforms (Pose > Clear Transform > All).",
         )
     world = np.array(shown.matrix_world, dtype=np.float64)
@@ -358,7 +368,7 @@ def set_bone_material(
     data = armature_data(armature)
     if not data.is_editable:
         raise WriteError(
-            f"The bones of '{armature.name}' are linked and read-only.",
+            phrase("The bones of '{armature}' are linked and read-only.", armature=armature.name),
             "Let the whole figure have the material, or measure in the linked file.",
         )
     bone = data.bones[name]

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from ...core.errors import RouteError
 from ...core.locomotion.path import Route, s_bend
+from ...core.phrases import phrase
 from ...core.rotations import Floats, normalized
 from ..rig import armature_data, world_of
 
@@ -63,8 +64,12 @@ def read_route(
         return _longest(lines, world, curve.name)
     if not 0 <= spline_index < len(lines):
         raise RouteError(
-            f"The curve '{curve.name}' has {len(lines)} splines; number {spline_index} is none "
-            "of them.",
+            phrase(
+                "The curve '{curve}' has {count} splines; number {number} is none of them.",
+                curve=curve.name,
+                count=len(lines),
+                number=spline_index,
+            ),
             "Numbers start at 0; -1 takes the longest.",
         )
     return lines[spline_index].route(world)
@@ -149,11 +154,14 @@ def _check_type(curve: bpy.types.Object) -> None:
         return
     if curve.type == "CURVES":
         raise RouteError(
-            f"'{curve.name}' is a hair curves object, which cannot be a route.",
+            phrase("'{curve}' is a hair curves object, which cannot be a route.", curve=curve.name),
             "Convert it to a mesh, and the mesh to a curve (Object › Convert).",
         )
     kind = curve.type.replace("_", " ").lower()
-    raise RouteError(f"'{curve.name}' is not a curve but of type {kind}.", _DRAW_ONE)
+    raise RouteError(
+        phrase("'{curve}' is not a curve but of type {kind}.", curve=curve.name, kind=kind),
+        _DRAW_ONE,
+    )
 
 
 def _longest(lines: Sequence[_Line], world: Floats, name: str) -> Route:
@@ -168,7 +176,9 @@ def _longest(lines: Sequence[_Line], world: Floats, name: str) -> Route:
         if best is None or route.length > best.length:
             best = route
     if best is None:
-        raise reason or RouteError(f"The curve '{name}' has no splines.", _ADD_POINTS)
+        raise reason or RouteError(
+            phrase("The curve '{name}' has no splines.", name=name), _ADD_POINTS
+        )
     return best
 
 

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import RigError
+from ...core.phrases import phrase
 from ...core.rotations import Floats, continuous, from_matrix
 from ..animation import curves_of, is_generated, note_of, time_kept
 from ..rig import vertex_positions, world_of
@@ -36,7 +37,8 @@ def read_form(target: bpy.types.Object) -> tuple[Floats, np.ndarray]:
         mesh = evaluated.to_mesh() if target.type in WITH_SURFACE else None
         if mesh is None or len(mesh.polygons) == 0:
             raise RigError(
-                f"'{target.name}' has no faces to grasp.", "Choose an object with a surface."
+                phrase("'{target}' has no faces to grasp.", target=target.name),
+                "Choose an object with a surface.",
             )
         vertices = vertex_positions(mesh)
         mesh.calc_loop_triangles()

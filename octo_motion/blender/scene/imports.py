@@ -19,6 +19,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import ClipError, WriteError
+from ...core.phrases import phrase
 from ...core.rotations import normalized
 from ...core.splicing.clip import MOTION_SUFFIXES, check_bvh
 from ...core.splicing.humanoid import map_skeleton
@@ -42,8 +43,10 @@ _LYING: Final = 0.8
 _IMPORTED: Final = 0.8
 """Of the work on a file: Blender's own importer, about."""
 
-_ANOTHER: Final = (
-    f"Choose a file that ends with {', '.join(MOTION_SUFFIXES[:-1])} or {MOTION_SUFFIXES[-1]}."
+_ANOTHER: Final = phrase(
+    "Choose a file that ends with {endings} or {last}.",
+    endings=", ".join(MOTION_SUFFIXES[:-1]),
+    last=MOTION_SUFFIXES[-1],
 )
 
 
@@ -229,7 +232,10 @@ _IMPORTERS: Final[Mapping[str, _Importer]] = {
 def _importer(path: Path) -> _Importer:
     importer = _IMPORTERS.get(path.suffix.lower())
     if importer is None:
-        raise ClipError(f"'{path.suffix}' files are no motion that can be imported.", _ANOTHER)
+        raise ClipError(
+            phrase("'{suffix}' files are no motion that can be imported.", suffix=path.suffix),
+            _ANOTHER,
+        )
     if not path.is_file():
         raise ClipError("There is no such file.", _ANOTHER)
     return importer
@@ -240,7 +246,9 @@ def _content(path: Path) -> bytes:
         content = path.read_bytes()
     except OSError as error:
         reason = error.strerror or type(error).__name__
-        raise ClipError(f"The file cannot be read: {reason}.", "Choose another one.") from error
+        raise ClipError(
+            phrase("The file cannot be read: {reason}.", reason=reason), "Choose another one."
+        ) from error
     if not content:
         raise ClipError("The file is empty.", "Export it again.")
     return content
@@ -257,9 +265,10 @@ def _call(operator: Any, **options: Any) -> None:
     except (RuntimeError, TypeError, ValueError, AttributeError) as error:
         lines = [line.strip() for line in str(error).splitlines() if line.strip()]
         reason = next((line for line in reversed(lines) if not line.startswith("Location")), "")
-        reason = reason.removeprefix("Error: ").rstrip(".") or "it does not say why"
+        reason = reason.removeprefix("Error: ").rstrip(".") or phrase("it does not say why")
         raise ClipError(
-            f"Blender's importer cannot read it: {reason}.", "Export it again."
+            phrase("Blender's importer cannot read it: {reason}.", reason=reason),
+            "Export it again.",
         ) from error
     if "FINISHED" not in result:
         raise ClipError("Blender's importer cannot read it.", "Export it again.")

@@ -12,6 +12,7 @@ from mathutils import Vector
 
 from ...core.content_cache import ContentCache, content_key
 from ...core.errors import GroundError, RigError
+from ...core.phrases import phrase
 from ...core.posing.solver import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
 from ...core.rotations import Floats, from_matrix
 from ..rig import vertex_positions, world_of
@@ -41,14 +42,19 @@ def read_triangles(
         GroundError: the object is no mesh, or has no faces.
     """
     if ground.type != "MESH":
-        raise GroundError(f"'{ground.name}' is not a mesh.", "Choose a mesh as the ground.")
+        raise GroundError(
+            phrase("'{ground}' is not a mesh.", ground=ground.name), "Choose a mesh as the ground."
+        )
     if ground.mode == "EDIT":
         ground.update_from_editmode()
     evaluated = ground.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
         if mesh is None or len(mesh.loop_triangles) == 0:
-            raise GroundError(f"The ground '{ground.name}' has no faces.", "Choose another mesh.")
+            raise GroundError(
+                phrase("The ground '{ground}' has no faces.", ground=ground.name),
+                "Choose another mesh.",
+            )
         points = vertex_positions(mesh)
         corners, content = _corners(mesh, points)
     finally:
@@ -105,7 +111,9 @@ def read_obstacle(item: bpy.types.Object, kind: str, unit: float) -> Obstacle:
     world = np.array(shown.matrix_world, dtype=np.float64)
     sizes = np.linalg.norm(world[:3, :3], axis=0)
     if not np.isfinite(world).all() or sizes.min() <= 0.0:
-        raise RigError(f"The obstacle '{item.name}' has no size.", "Repair its scale.")
+        raise RigError(
+            phrase("The obstacle '{item}' has no size.", item=item.name), "Repair its scale."
+        )
     axes = world[:3, :3] / sizes
     # Of what is mirrored, another axis than a plane's is turned round.
     axes[:, 0] *= np.sign(np.linalg.det(axes)) or 1.0
@@ -139,7 +147,9 @@ def _bounds(shown: bpy.types.Object) -> tuple[Floats, Floats]:
         # Empties and the like show how large they are in their own way.
         size = float(getattr(shown, "empty_display_size", 0.0))
         if size <= 0.0:
-            raise RigError(f"The obstacle '{shown.name}' has no size.", "Repair its scale.")
+            raise RigError(
+                phrase("The obstacle '{shown}' has no size.", shown=shown.name), "Repair its scale."
+            )
         return np.full(3, -size), np.full(3, size)
     return low, high
 
@@ -147,7 +157,8 @@ def _bounds(shown: bpy.types.Object) -> tuple[Floats, Floats]:
 def _check_corners(shown: bpy.types.Object, places: np.ndarray) -> None:
     if not np.isfinite(places).all():
         raise RigError(
-            f"The obstacle '{shown.name}' has corners at undefined positions.", "Repair its mesh."
+            phrase("The obstacle '{shown}' has corners at undefined positions.", shown=shown.name),
+            "Repair its mesh.",
         )
 
 
@@ -159,7 +170,8 @@ def _triangles(shown: bpy.types.Object, *, convex: bool) -> Floats:
         mesh = None
     if mesh is None or not len(mesh.polygons):
         raise RigError(
-            f"The obstacle '{shown.name}' has no faces.", "Choose another shape for it: a box."
+            phrase("The obstacle '{shown}' has no faces.", shown=shown.name),
+            "Choose another shape for it: a box.",
         )
     _check_corners(shown, vertex_positions(mesh))
     editable = bmesh.new()
@@ -183,7 +195,12 @@ def _triangles(shown: bpy.types.Object, *, convex: bool) -> Floats:
         shown.to_mesh_clear()
     if len(found) > MOST_TRIANGLES:
         raise RigError(
-            f"The obstacle '{shown.name}' has {len(found)} triangles, more than {MOST_TRIANGLES}.",
+            phrase(
+                "The obstacle '{shown}' has {count} triangles, more than {most_triangles}.",
+                shown=shown.name,
+                count=len(found),
+                most_triangles=MOST_TRIANGLES,
+            ),
             "Mark a simpler object in its place, or choose another shape for it.",
         )
     return found

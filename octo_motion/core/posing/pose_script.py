@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from ..errors import SettingsError
+from ..phrases import phrase
 
 FORMAT: Final = "octo_motion.pose"
 VERSION: Final = 1
@@ -82,23 +83,32 @@ def parse_script(text: str, name: str) -> PoseScript:
     try:
         data = json.loads(text)
     except ValueError as error:
-        raise SettingsError(f"'{name}' is not JSON: {error}.", "Repair it there.") from None
+        raise SettingsError(
+            phrase("'{name}' is not JSON: {error}.", name=name, error=error), "Repair it there."
+        ) from None
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise SettingsError(
-            f"'{name}' is no script of posing.", f'It begins with "format": "{FORMAT}".'
+            phrase("'{name}' is no script of posing.", name=name),
+            phrase('It begins with "format": "{format}".', format=FORMAT),
         )
     if data.get("version") != VERSION:
         raise SettingsError(
-            f"'{name}' has format version {data.get('version')}.",
-            f"This version of Octo Motion reads version {VERSION}.",
+            phrase(
+                "'{name}' has format version {version}.", name=name, version=data.get("version")
+            ),
+            phrase("This version of Octo Motion reads version {version}.", version=VERSION),
         )
     extra = sorted(set(data) - {"format", "version", "settings", "steps"})
     settings, steps = data.get("settings", {}), data.get("steps")
     if extra:
-        raise SettingsError(f"'{name}' has an unknown entry '{extra[0]}'.", "Check its spelling.")
+        raise SettingsError(
+            phrase("'{name}' has an unknown entry '{extra}'.", name=name, extra=extra[0]),
+            "Check its spelling.",
+        )
     if not isinstance(settings, dict) or not isinstance(steps, list):
         raise SettingsError(
-            f"'{name}' has no list of steps, or odd settings.", "See the scripting reference."
+            phrase("'{name}' has no list of steps, or odd settings.", name=name),
+            "See the scripting reference.",
         )
     return PoseScript(
         steps=tuple(_step(each, number) for number, each in enumerate(steps, 1)),
@@ -108,28 +118,31 @@ def parse_script(text: str, name: str) -> PoseScript:
 
 def _step(data: Any, number: int) -> ScriptStep:
     def wrong(what: str) -> SettingsError:
-        return SettingsError(f"Step {number} of the script {what}.", "See the scripting reference.")
+        return SettingsError(
+            phrase("Step {number} of the script {what}.", number=number, what=what),
+            "See the scripting reference.",
+        )
 
     if not isinstance(data, dict) or data.get("do") not in _NEEDED:
-        raise wrong(f"does not say what to do, one of {', '.join(_NEEDED)}")
+        raise wrong(phrase("does not say what to do, one of {needed}", needed=", ".join(_NEEDED)))
     do = data["do"]
     needed = _NEEDED[do]
     allowed = _ALLOWED.get(do, needed) | {"do"}
     if missing := sorted(needed - set(data)):
-        raise wrong(f"('{do}') lacks '{missing[0]}'")
+        raise wrong(phrase("('{do}') lacks '{missing}'", do=do, missing=missing[0]))
     if extra := sorted(set(data) - allowed):
-        raise wrong(f"('{do}') has an unknown entry '{extra[0]}'")
+        raise wrong(phrase("('{do}') has an unknown entry '{extra}'", do=do, extra=extra[0]))
     if (
         do == "pull"
         and ("by" in data) == ("to" in data)
         and not ("turn" in data and "by" not in data)
     ):
-        raise wrong("('pull') says either 'by' or 'to'")
+        raise wrong(phrase("('pull') says either 'by' or 'to'"))
     values: dict[str, Any] = {"do": do}
     for key in set(data) - {"do"}:
         value = _READERS[key](data[key])
         if value is None:
-            raise wrong(f"('{do}') has a '{key}' that makes no sense")
+            raise wrong(phrase("('{do}') has a '{key}' that makes no sense", do=do, key=key))
         values[key] = value
     return ScriptStep(**values)
 

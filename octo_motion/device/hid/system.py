@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Final, Protocol
 
 from ...core.errors import DeviceError
+from ...core.phrases import phrase
 from ...core.rotations.scalars import Vector
 from ..driver import Description, DeviceLostError, Driver, Dynamics, Kind
 
@@ -99,7 +100,9 @@ def hidapi() -> Any:
             refused = error
     if refused is not None:
         raise DeviceError(
-            f"Devices cannot be read: the system refuses hidapi ({refused}).",
+            phrase(
+                "Devices cannot be read: the system refuses hidapi ({refused}).", refused=refused
+            ),
             "On a Mac, allow it in System Settings, Privacy & Security; else install the extension "
             "anew.",
         ) from refused
@@ -230,7 +233,7 @@ def _claim_on_windows(found: Found) -> Callable[[], None]:
 
 def _in_use(found: Found) -> DeviceError:
     return DeviceError(
-        f"{found.name or 'The device'} is in use by another Blender.",
+        phrase("{name} is in use by another Blender.", name=found.name or "The device"),
         "End Pose with Device there.",
     )
 
@@ -245,18 +248,24 @@ def _refusal(found: Found) -> DeviceError:
                 "If Blender has it itself, just push it. Else, as root," if pushed else "As root,"
             )
             return DeviceError(
-                f"{name} is plugged in, but this user may not read {path}.",
-                f"{begin} write this line into {UDEV_FILE}, then plug the device in again: "
-                f"{udev_rule(found.vendor, found.product)}",
+                phrase(
+                    "{name} is plugged in, but this user may not read {path}.", name=name, path=path
+                ),
+                phrase(
+                    "{begin} write this line into {file}, then plug the device in again: {rule}",
+                    begin=begin,
+                    file=UDEV_FILE,
+                    rule=udev_rule(found.vendor, found.product),
+                ),
             )
     elif (found.page, found.usage) == MULTI_AXIS:
         # 3Dconnexion's driver has it alone; two that read it would both move something.
         return DeviceError(
-            f"{name} belongs to its own driver.",
+            phrase("{name} belongs to its own driver.", name=name),
             "Blender has it itself then: just push it.",
         )
     return DeviceError(
-        f"{name} cannot be opened.",
+        phrase("{name} cannot be opened.", name=name),
         "Plug it in again, and close other programs that use it alone.",
     )
 

@@ -28,6 +28,7 @@ from pathlib import Path
 from typing import BinaryIO, Final, NoReturn
 
 from ...core.errors import DeviceError
+from ...core.phrases import phrase
 from ..messages import (
     HEADER,
     MAGIC,
@@ -259,7 +260,10 @@ def python_executable() -> Path:
             return path
     raise DeviceError(
         "Blender's own Python was not found, so devices cannot be used.",
-        f"Use a Blender from blender.org, which has its Python below {sys.prefix}.",
+        phrase(
+            "Use a Blender from blender.org, which has its Python below {prefix}.",
+            prefix=sys.prefix,
+        ),
     )
 
 
@@ -314,7 +318,7 @@ class Child:
                 )
         except OSError as error:
             raise DeviceError(
-                f"The device's program does not start: {error.strerror}.",
+                phrase("The device's program does not start: {strerror}.", strerror=error.strerror),
                 "Look whether a virus scanner or a full disk keeps Blender's Python from running.",
             ) from error
         assert process.stdin is not None
@@ -381,7 +385,8 @@ def _silent(status: int | None, log_file: Path | None) -> DeviceError:
         )
     where = log_file or "Blender's console"
     return DeviceError(
-        "The device's program does not answer.", f"Start it again; its messages are in {where}."
+        "The device's program does not answer.",
+        phrase("Start it again; its messages are in {where}.", where=where),
     )
 
 

@@ -24,6 +24,7 @@ from contextlib import suppress
 from typing import Any, Final
 
 from ...core.errors import DeviceError
+from ...core.phrases import phrase
 from ...core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector, normalized, subtract
 from ..driver import Description, DeviceLostError, Driver, Dynamics, Kind, Sample, is_possible
 from .websocket import WebSocket, WebSocketError, received_until
@@ -64,7 +65,10 @@ def service_version(port: int = PORT, seconds: float = 0.3) -> tuple[int, int] |
     version = (int(found[1]), int(found[2]))
     if not OLDEST <= version < TOO_NEW:
         raise DeviceError(
-            f"The Haply service has version {found[0]}, which Octo Motion does not speak.",
+            phrase(
+                "The Haply service has version {version}, which Octo Motion does not speak.",
+                version=found[0],
+            ),
             "Install a version from 3.1 on and before 4 with the Haply Hub.",
         )
     return version

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from ...core.errors import DeviceError
+from ...core.phrases import phrase
 from ...core.rotations.scalars import Vector, normalized
 from ..driver import Dynamics, Sample, is_possible
 
@@ -90,7 +91,7 @@ def key_in(path: Path) -> bytes:
         # Windows keeps a user's own folders from others by itself, and has no such bits.
         if os.name != "nt" and path.stat().st_mode & 0o077:
             raise DeviceError(
-                f"The key in {path} may be read by others.",
+                phrase("The key in {path} may be read by others.", path=path),
                 "Delete the file: a new one is made, which only you may read.",
             )
         key = bytes.fromhex(path.read_text(encoding="ascii"))
@@ -98,8 +99,11 @@ def key_in(path: Path) -> bytes:
         key = b""
     if len(key) != KEY_BYTES:
         raise DeviceError(
-            f"The file {path} has no key for programs.",
-            f"Delete it, and a new one is made; or write {2 * KEY_BYTES} hexadecimal digits.",
+            phrase("The file {path} has no key for programs.", path=path),
+            phrase(
+                "Delete it, and a new one is made; or write {digits} hexadecimal digits.",
+                digits=2 * KEY_BYTES,
+            ),
         )
     return key
 

@@ -9,6 +9,8 @@ import bpy
 
 from ...blender.animation import key_counts
 from ...blender.files import NODE, curve_node
+from ...core.phrases import phrase
+from ..language import translated
 from ..panel_base import ArmaturePanel, TabPanel, armature_in, draw_sentence
 from .operators import (
     OCTO_MOTION_MT_gait,
@@ -55,7 +57,7 @@ class OCTO_MOTION_PT_rig(TabPanel, bpy.types.Panel):
             )
             return
         if armature != context.object:
-            layout.label(text=armature.name, icon="OUTLINER_OB_ARMATURE")
+            layout.label(text=armature.name, icon="OUTLINER_OB_ARMATURE", translate=False)
         if not armature.is_editable:
             column = layout.column(align=True)
             column.label(text="Linked and read-only.", icon="LIBRARY_DATA_DIRECT")
@@ -238,12 +240,20 @@ def _draw_result(layout: Any, action: bpy.types.Action) -> None:
     render = cast("bpy.types.Scene", bpy.context.scene).render
     length = (action.frame_end - action.frame_start) / render.fps * render.fps_base
     column = layout.column(align=True)
-    column.label(text=action.name, icon="ACTION")
+    column.label(text=action.name, icon="ACTION", translate=False)
     frames = action.frame_end - action.frame_start + 1.0
-    column.label(text=f"{frames:.0f} frames, {length:.1f} s", icon="BLANK1")
+    column.label(
+        text=translated(
+            phrase("{frames:.0f} frames, {length:.1f} s", frames=frames, length=length)
+        ),
+        icon="BLANK1",
+    )
     keys, dense = key_counts(action)
     if keys < dense:
-        column.label(text=f"{keys:,} keys instead of {dense:,}", icon="BLANK1")
+        column.label(
+            text=translated(phrase("{keys:,} keys instead of {dense:,}", keys=keys, dense=dense)),
+            icon="BLANK1",
+        )
 
 
 CLASSES: Final = (

@@ -10,6 +10,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 
 from ...core.errors import OctoMotionError
+from ...core.phrases import as_phrase, joined_phrases, phrase
 from ...core.posing.picking import Hit
 from ...core.rotations import IDENTITY, Floats, from_axis_angle, multiply
 from .measuring_hand import MeasuringHand
@@ -17,28 +18,28 @@ from .puppet_session import PuppetSession
 from .viewport import go_to
 
 HELP: Final = (
-    ("Drag", "pull"),
-    ("Wheel", "depth"),
-    ("R Drag, Ctrl Wheel", "turn"),
-    ("Shift", "fine"),
-    ("G", "grab or free"),
-    ("P", "pin"),
-    ("K", "key touched"),
-    ("Shift K", "key all"),
-    ("O", "record"),
-    ("M", "measure"),
-    ("R", "restore"),
-    ("Ctrl Z", "back"),
-    ("Ctrl Shift Z", "forward"),
-    ("Enter", "keep"),
-    ("Esc", "as it was"),
+    (phrase("Drag"), phrase("pull")),
+    (phrase("Wheel"), phrase("depth")),
+    (phrase("R Drag, Ctrl Wheel"), phrase("turn")),
+    (phrase("Shift"), phrase("fine")),
+    (phrase("G"), phrase("grab or free")),
+    (phrase("P"), phrase("pin")),
+    (phrase("K"), phrase("key touched")),
+    (phrase("Shift K"), phrase("key all")),
+    (phrase("O"), phrase("record")),
+    (phrase("M"), phrase("measure")),
+    (phrase("R"), phrase("restore")),
+    (phrase("Ctrl Z"), phrase("back")),
+    (phrase("Ctrl Shift Z"), phrase("forward")),
+    (phrase("Enter"), phrase("keep")),
+    (phrase("Esc"), phrase("as it was")),
 )
 MEASURING: Final = (
-    ("Drag", "bend the limb and let go; then lead it to where it is to stay"),
-    ("Wheel", "pull"),
-    ("M, Enter", "the figure becomes so"),
-    ("Shift M", "this joint alone"),
-    ("Esc", "no"),
+    (phrase("Drag"), phrase("bend the limb and let go; then lead it to where it is to stay")),
+    (phrase("Wheel"), phrase("pull")),
+    (phrase("M, Enter"), phrase("the figure becomes so")),
+    (phrase("Shift M"), phrase("this joint alone")),
+    (phrase("Esc"), phrase("no")),
 )
 PULL_STEP: Final = 0.25
 """In what hangs on the joint, per notch of the wheel while measuring."""
@@ -152,7 +153,9 @@ class PoseControls:
         if kind == "LEFTMOUSE":
             hit = self._look(view, x, y)
             if hit is None or not measuring.takes(hit.body):
-                self.message = f"Drag {session.bone(measuring.body)}, which is measured"
+                self.message = phrase(
+                    "Drag {bone}, which is measured", bone=session.bone(measuring.body)
+                )
                 return Outcome.TAKEN
             measuring.grab(hit.point)
             self.hand, self._pixel = hit.point / session.unit, (x, y)
@@ -168,7 +171,7 @@ class PoseControls:
             except OctoMotionError as error:
                 # Another drag may put it right.
                 session.drop_measure()
-                self.message = str(error)
+                self.message = as_phrase(error)
         elif kind not in _OWN:
             return Outcome.PASSED
         return Outcome.TAKEN
@@ -317,32 +320,44 @@ class PoseControls:
         try:
             self.message = do()
         except OctoMotionError as error:
-            self.message = str(error)
+            self.message = as_phrase(error)
 
     def status(self) -> str:
         """One line about the session, for the header."""
         session = self.session
-        parts = [f"Posing {session.puppet.name}"]
+        parts: list[str] = [phrase("Posing {puppet}", puppet=session.puppet.name)]
         measuring = session.measuring
         if measuring is not None:
             bone, angle = session.bone(measuring.body), np.degrees(measuring.angle)
-            step = "stays" if measuring.shown else "bends"
+            step = phrase("stays") if measuring.shown else phrase("bends")
             parts.append(
-                f"Measuring {bone}: pulled by {measuring.pull:.2f} of what hangs on it,"
-                f" {step} {angle:.0f}°"
+                phrase(
+                    "Measuring {bone}: pulled by {pull:.2f} of what hangs on it, {step} "
+                    "{angle:.0f}°",
+                    bone=bone,
+                    pull=measuring.pull,
+                    step=step,
+                    angle=angle,
+                )
             )
         elif self.holding and session.held is not None:
             bone = session.bone(session.held.body)
-            parts.append(f"{bone}: pulled by {session.pull():.2f} of the figure's weight")
+            parts.append(
+                phrase(
+                    "{bone}: pulled by {pull:.2f} of the figure's weight",
+                    bone=bone,
+                    pull=session.pull(),
+                )
+            )
         elif self.hover is not None:
-            parts.append(session.bone(self.hover))
+            parts.append(phrase("{bone}", bone=session.bone(self.hover)))
         if session.recording:
             parts.append("● Recording")
         report = session.report
         if report is not None and not report.resting and report.ratio < SLOW:
-            parts.append(f"slower than real time: {100.0 * report.ratio:.0f} %")
+            parts.append(phrase("slower than real time: {ratio:.0f} %", ratio=100.0 * report.ratio))
         parts += [each for each in (self.message, session.missed, session.warning) if each]
-        return "    ".join(parts)
+        return joined_phrases("    ", parts)
 
 
 class Undoable(Protocol):

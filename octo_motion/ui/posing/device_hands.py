@@ -16,6 +16,7 @@ import numpy as np
 from ...blender.files import load_calibrations, save_calibrations
 from ...blender.versions import ndof_sensitivities
 from ...core.errors import SettingsError, WriteError
+from ...core.phrases import phrase
 from ...core.posing.picking import nearest_body
 from ...core.posing.puppet import Pose
 from ...core.posing.solver import Obstacle
@@ -107,8 +108,8 @@ class HandsBase:
     def trouble(self) -> str:
         """What is wrong with the program at the devices; empty where it answers."""
         if self.client.state is ClientState.LOST:
-            return "has ended"
-        return "does not answer" if self.client.silent else ""
+            return phrase("has ended")
+        return phrase("does not answer") if self.client.silent else ""
 
     def pin(self) -> None:
         """Pin what is held, or take the pin out."""
@@ -290,7 +291,7 @@ class DeviceHands(HandsBase):
         """Begin to learn a device's zero and range, use what was learned, or go on as before."""
         self.client.calibrate(number, order)
         name = self.client.devices[number].name
-        self.message = f"Calibrating: {name}" if order is Order.BEGIN else ""
+        self.message = phrase("Calibrating: {name}", name=name) if order is Order.BEGIN else ""
 
     def reset_calibration(self, number: int) -> None:
         """Forget what was learned of a device.
@@ -326,7 +327,7 @@ class DeviceHands(HandsBase):
         self.session.tick(0.0)
         self._send_changes(settings)
         for number, device in self.calibrations.keep_learned():
-            self.message = f"Calibrated: {device.name}"
+            self.message = phrase("Calibrated: {device}", device=device.name)
             self._fit(number, device)
         self.calibrations.send()
         if room is not None:

@@ -12,10 +12,12 @@ from bpy.props import EnumProperty, IntProperty
 
 from ...blender.files import own_folder
 from ...core.errors import DeviceError, OctoMotionError, SettingsError
+from ...core.phrases import joined_phrases, phrase
 from ...core.rotations import Floats
 from ...device.driver import Kind
 from ...device.ipc import Client
 from ...device.messages import Buzz, Notice, Order
+from ..language import reported
 from ..operator_base import OctoOperator
 from .controls import Outcome, undone
 from .device_hands import (
@@ -32,18 +34,18 @@ from .pose_operator import SessionOperator, tell
 from .puppet_session import PuppetSession, active_session
 
 HELP: Final = (
-    ("First button or G", "grab"),
-    ("Second button or K", "key touched"),
-    ("Shift K", "key all"),
-    ("P", "pin"),
-    ("O", "record"),
-    ("R", "restore"),
-    ("Ctrl Z", "back"),
-    ("Ctrl Shift Z", "forward"),
-    ("Home", "pointer to the middle"),
-    ("B", "start the device's program again"),
-    ("Enter", "keep"),
-    ("Esc", "as it was"),
+    (phrase("First button or G"), phrase("grab")),
+    (phrase("Second button or K"), phrase("key touched")),
+    (phrase("Shift K"), phrase("key all")),
+    (phrase("P"), phrase("pin")),
+    (phrase("O"), phrase("record")),
+    (phrase("R"), phrase("restore")),
+    (phrase("Ctrl Z"), phrase("back")),
+    (phrase("Ctrl Shift Z"), phrase("forward")),
+    (phrase("Home"), phrase("pointer to the middle")),
+    (phrase("B"), phrase("start the device's program again")),
+    (phrase("Enter"), phrase("keep")),
+    (phrase("Esc"), phrase("as it was")),
 )
 _COVERS: Final = 0.7
 """Of what a camera sees from left to right: as much as of a view that is none."""
@@ -165,7 +167,7 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
         if was_holding and not hands.holding:
             self._let_go(context, hands)
         for notice in hands.notices():
-            self.report({"WARNING"}, f"{notice.problem} {notice.remedy}".strip())
+            self.report({"WARNING"}, reported(joined_phrases(" ", (notice.problem, notice.remedy))))
         tell(context, line(hands), HELP)
 
     def _let_go(self, context: bpy.types.Context, hands: Hands) -> None:
@@ -262,23 +264,23 @@ def _is_undo(event: Any) -> bool:
 
 def line(hands: Hands) -> str:
     """One line about devices, for the header."""
-    parts = [f"Posing {hands.session.puppet.name}"]
+    parts: list[str] = [phrase("Posing {puppet}", puppet=hands.session.puppet.name)]
     shown = hands.shown()
     if trouble := hands.trouble():
-        parts.append(f"The device's program {trouble}: B starts it again")
+        parts.append(phrase("The device's program {trouble}: B starts it again", trouble=trouble))
     elif not shown:
         is_blenders = isinstance(hands, NdofHands)
         parts.append(NDOF_NAME if is_blenders else "No device yet: plug one in")
     for each in shown:
-        what = hands.session.bone(each.body) if each.body >= 0 else "free"
+        what = hands.session.bone(each.body) if each.body >= 0 else phrase("free")
         if each.number in hands.client.calibrating:
-            what = "is being calibrated"
-        parts.append(f"{each.name}: {what}")
+            what = phrase("is being calibrated")
+        parts.append(phrase("{device}: {what}", device=each.name, what=what))
     if hands.session.recording:
         parts.append("● Recording")
     if hands.message:
         parts.append(hands.message)
-    return "    ".join(parts)
+    return joined_phrases("    ", parts)
 
 
 class DeviceOperator(OctoOperator):
@@ -341,7 +343,8 @@ class OCTO_MOTION_OT_device_calibrate(DeviceOperator, bpy.types.Operator):
         number = self.number
         if number not in hands.client.devices:
             raise SettingsError(
-                f"No device has the number {number}.", "Plug it in, or choose another one."
+                phrase("No device has the number {number}.", number=number),
+                "Plug it in, or choose another one.",
             )
         if self.step == "RESET":
             hands.reset_calibration(number)

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from ...core.errors import RigError
+from ...core.phrases import joined_phrases, phrase
 from ...core.posing.puppet import (
     Bend,
     Figure,
@@ -133,7 +134,10 @@ def check_joint(figure: Figure, body: int) -> None:
     """
     if figure.parents[body] < 0:
         raise RigError(
-            f"'{figure.names[body]}' hangs on no other limb, so it has no joint to bend.",
+            phrase(
+                "'{name}' hangs on no other limb, so it has no joint to bend.",
+                name=figure.names[body],
+            ),
             "Choose a limb further out.",
         )
 
@@ -157,7 +161,17 @@ def measured_joint(
 
 def coefficients(bone: str, measured: MeasuredBend) -> str:
     """The coefficients, for people."""
-    text = f"{bone}: K_f {measured.stiffness:.3g} N·m/rad, D_f {measured.damping:.3g} N·m·s/rad"
+    text = phrase(
+        "{bone}: K_f {stiffness:.3g} N·m/rad, D_f {damping:.3g} N·m·s/rad",
+        bone=bone,
+        stiffness=measured.stiffness,
+        damping=measured.damping,
+    )
     if not np.isfinite(measured.yield_torque):
-        return text + ", never gives way"
-    return text + f", D_d {measured.flow:.3g} N·m·s/rad, yields at {measured.yield_torque:.3g} N·m"
+        return joined_phrases("", (text, ", never gives way"))
+    gives_way = phrase(
+        ", D_d {flow:.3g} N·m·s/rad, yields at {yield_torque:.3g} N·m",
+        flow=measured.flow,
+        yield_torque=measured.yield_torque,
+    )
+    return joined_phrases("", (text, gives_way))

@@ -21,7 +21,9 @@ from ...blender.rig import (
     set_bone_material,
 )
 from ...core.errors import OctoMotionError, RigError, WriteError
+from ...core.phrases import phrase
 from ...core.posing.puppet import Bend, Figure, JointCoefficients
+from ..language import reported
 from ..operator_base import ArmatureOperator, OctoOperator
 from .measuring_hand import BEARS, check_joint, coefficients, measured_joint
 from .properties import OBSTACLES, posing_settings
@@ -57,11 +59,13 @@ class OCTO_MOTION_OT_pose_mark_bones(ArmatureOperator, bpy.types.Operator):
         data = armature.data
         if data is None or not data.is_editable:
             raise WriteError(
-                f"The bones of '{armature.name}' are linked and read-only.",
+                phrase(
+                    "The bones of '{armature}' are linked and read-only.", armature=armature.name
+                ),
                 "Mark them in the linked file.",
             )
         mark_bones(armature, list(names), "" if self.mark == "AUTO" else self.mark)
-        self.report({"INFO"}, f"Marked {len(names)} bones.")
+        self.report({"INFO"}, reported(phrase("Marked {count} bones.", count=len(names))))
 
 
 class OCTO_MOTION_OT_pose_obstacle(OctoOperator, bpy.types.Operator):
@@ -88,12 +92,13 @@ class OCTO_MOTION_OT_pose_obstacle(OctoOperator, bpy.types.Operator):
         for each in chosen:
             if not each.is_editable:
                 raise WriteError(
-                    f"'{each.name}' is linked and read-only here.", "Make a library override."
+                    phrase("'{each}' is linked and read-only here.", each=each.name),
+                    "Make a library override.",
                 )
         for item in chosen:
             own: Any = item
             own.octo_motion.posing.obstacle = self.kind
-        self.report({"INFO"}, f"Marked {len(chosen)} objects.")
+        self.report({"INFO"}, reported(phrase("Marked {count} objects.", count=len(chosen))))
 
 
 # --- Saying how a joint is to give way, and getting the material that does so ---------------------
@@ -171,7 +176,7 @@ class OCTO_MOTION_OT_pose_measure(ArmatureOperator, bpy.types.Operator):
             session.take_material(material, bone)
         else:
             keep_material(armature, settings, material, bone)
-        self.report({"INFO"}, coefficients(figure.names[body], measured))
+        self.report({"INFO"}, reported(coefficients(figure.names[body], measured)))
 
 
 _AboutAxes: Final = partial(FloatVectorProperty, size=3, min=0.0, precision=4, subtype="XYZ")
@@ -232,7 +237,7 @@ class OCTO_MOTION_OT_pose_coefficients(ArmatureOperator, bpy.types.Operator):
                 rig = read_rig(armature, smallest=settings.smallest)
                 elements = joints_of_now(Puppet(armature, rig))
         except OctoMotionError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, reported(error))
             return {"CANCELLED"}
         self.bone = figure.names[body]
         for name in ("stiffness", "damping", "flow"):
@@ -258,7 +263,10 @@ class OCTO_MOTION_OT_pose_coefficients(ArmatureOperator, bpy.types.Operator):
             session.take_material(typed, figure.names[body])
         else:
             set_bone_material(armature, figure.names[body], typed)
-        self.report({"INFO"}, f"{figure.names[body]} has coefficients of its own")
+        self.report(
+            {"INFO"},
+            reported(phrase("{name} has coefficients of its own", name=figure.names[body])),
+        )
 
 
 def joint_of(
@@ -306,7 +314,10 @@ class OCTO_MOTION_OT_pose_forget_measured(ArmatureOperator, bpy.types.Operator):
         session = _session_of(armature)
         if session is not None:
             session.read_materials()
-        self.report({"INFO"}, f"{len(own)} bones are of the figure's material again.")
+        self.report(
+            {"INFO"},
+            reported(phrase("{count} bones are of the figure's material again.", count=len(own))),
+        )
 
 
 def _session_of(armature: bpy.types.Object) -> PuppetSession | None:

@@ -7,10 +7,12 @@ from typing import Any, Final
 
 import bpy
 
+from ...core.phrases import phrase
 from ...device.calibration import Phase, reached
 from ...device.driver import Kind
 from ...device.hid import why_not_read
 from ...device.messages import DeviceMessage
+from ..language import translated
 from ..operator_base import window_manager
 from ..panel_base import ArmaturePanel
 from .device_hands import NDOF_NAME, DeviceHands, NdofHands
@@ -152,7 +154,7 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
         if hands is not None:
             self._devices(layout, hands)
         if why := why_not_read():
-            layout.label(text=why, icon="INFO")
+            layout.label(text=translated(why), icon="INFO")
         for name in ("force", "toggle", "speed", "scale", "reach"):
             layout.prop(own, name)
         column = layout.column()
@@ -160,7 +162,7 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
         column.prop(own, "simulate")
         column.prop(own, "port")
         if own.port:
-            column.label(text=str(key_file()), icon="LOCKED")
+            column.label(text=str(key_file()), icon="LOCKED", translate=False)
 
     @staticmethod
     def _devices(layout: Any, hands: Hands) -> None:
@@ -171,7 +173,9 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
             return
         if trouble := hands.trouble():
             box.alert = True
-            box.label(text=f"The program {trouble}", icon="ERROR")
+            box.label(
+                text=translated(phrase("The program {trouble}", trouble=trouble)), icon="ERROR"
+            )
             box.label(text="B over the viewport starts it again")
             return
         if not client.devices:
@@ -180,7 +184,7 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
         for number, device in client.devices.items():
             column = box.column(align=True)
             row = column.split(factor=0.7)
-            row.label(text=device.name, icon="ORIENTATION_GIMBAL")
+            row.label(text=device.name, icon="ORIENTATION_GIMBAL", translate=False)
             shown = forces.get(number)
             if device.force > 0.0:
                 row.operator(OCTO_MOTION_OT_device_test.bl_idname, text="Test").number = number
@@ -194,16 +198,32 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
             column = box.column(align=True)
             row = column.row()
             row.alert = times.late[1] > _LATE
-            row.label(text=f"{times.rate:.0f} Hz, {1e3 * times.late[1]:.2f} ms off at most")
+            row.label(
+                text=translated(
+                    phrase(
+                        "{rate:.0f} Hz, {late:.2f} ms off at most",
+                        rate=times.rate,
+                        late=1e3 * times.late[1],
+                    )
+                )
+            )
             row = column.row()
             # Before its first step the simulation has no pace.
             row.alert = 0.0 < times.pace < _SLOW
-            slow = f", {100.0 * times.pace:.0f} % of real time" if row.alert else ""
-            row.label(text=f"A step takes {1e3 * times.step:.1f} ms{slow}")
+            slow = (
+                phrase(", {pace:.0f} % of real time", pace=100.0 * times.pace) if row.alert else ""
+            )
+            row.label(
+                text=translated(
+                    phrase("A step takes {step:.1f} ms{slow}", step=1e3 * times.step, slow=slow)
+                )
+            )
             if times.lag > 0.0:
                 row = column.row()
                 row.alert = times.lag > _LAGS
-                row.label(text=f"{1e3 * times.lag:.0f} ms from hand to pose")
+                row.label(
+                    text=translated(phrase("{lag:.0f} ms from hand to pose", lag=1e3 * times.lag))
+                )
 
 
 def draw_calibration(layout: Any, hands: DeviceHands, number: int, device: DeviceMessage) -> None:
@@ -226,9 +246,15 @@ def draw_calibration(layout: Any, hands: DeviceHands, number: int, device: Devic
         column.label(text="Take your hand off it …", icon="TIME")
     else:
         there, ends = reached(learning.calibration(), Kind(device.kind))
-        way = "Push and turn" if device.kind == Kind.RATE else "Move"
-        column.label(text=f"{way} it as far as it goes, each way", icon="ORIENTATION_GIMBAL")
-        column.progress(factor=there / ends, text=f"{there} of {ends}")
+        way = phrase("Push and turn") if device.kind == Kind.RATE else phrase("Move")
+        column.label(
+            text=translated(phrase("{way} it as far as it goes, each way", way=way)),
+            icon="ORIENTATION_GIMBAL",
+        )
+        column.progress(
+            factor=there / ends,
+            text=translated(phrase("{there} of {ends}", there=there, ends=ends)),
+        )
     row = column.row(align=True)
     done = row.row(align=True)
     done.enabled = learning.phase == Phase.REACH

@@ -12,7 +12,9 @@ import bpy
 
 from ...blender.rig import active_armature
 from ...core.errors import OctoMotionError, SettingsError
+from ...core.phrases import joined_phrases, phrase
 from .. import at_work
+from ..language import reported, translated
 from ..operator_base import ArmatureOperator
 from .controls import Outcome, PoseControls
 from .overlay import Overlay
@@ -50,7 +52,7 @@ class SessionOperator(ArmatureOperator):
     def obstacle(cls, context: bpy.types.Context) -> str:
         going_on = active_session()
         if going_on is not None:
-            return f"{going_on.puppet.name} is being posed already"
+            return phrase("{puppet} is being posed already", puppet=going_on.puppet.name)
         return super().obstacle(context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
@@ -82,7 +84,8 @@ class SessionOperator(ArmatureOperator):
                 # Another workspace may bring its mode along: no error, and no popup.
                 name = self._session.puppet.name
                 self._end(context, keep=True)
-                self.report({"INFO"}, f"Posing has ended: {name} is in edit mode")  # type: ignore[attr-defined]
+                told = phrase("Posing has ended: {name} is in edit mode", name=name)
+                self.report({"INFO"}, reported(told))  # type: ignore[attr-defined]
                 return {"FINISHED", "PASS_THROUGH"}
             outcome = self.turn(context, event)
             if outcome is Outcome.PASSED:
@@ -106,7 +109,7 @@ class SessionOperator(ArmatureOperator):
 
     def _fail(self, context: bpy.types.Context, error: OctoMotionError) -> set[OperatorReturnItems]:
         self._end(context, keep=False)
-        self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
+        self.report({"ERROR"}, reported(error))  # type: ignore[attr-defined]
         return {"CANCELLED"}
 
     def _end(self, context: bpy.types.Context, *, keep: bool) -> None:
@@ -122,7 +125,7 @@ class SessionOperator(ArmatureOperator):
                 if session is not None:
                     session.finish() if keep else session.cancel()
         except OctoMotionError as error:
-            self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
+            self.report({"ERROR"}, reported(error))  # type: ignore[attr-defined]
         finally:
             if overlay is not None:
                 overlay.take_down()
@@ -145,12 +148,14 @@ def tell(
     for screen in screens:
         for area in screen.areas if screen is not None else ():
             if area.type == "VIEW_3D":
-                area.header_text_set(line)
+                area.header_text_set(None if line is None else translated(line))
                 area.tag_redraw()
-    shown = "    ".join(f"{key}: {what}" for key, what in keys)
+    shown = joined_phrases(
+        "    ", (phrase("{key}: {what}", key=key, what=what) for key, what in keys)
+    )
     for workspace in workspaces:
         if workspace is not None:
-            workspace.status_text_set(None if line is None else shown)
+            workspace.status_text_set(None if line is None else translated(shown))
 
 
 # --- Posing by hand in the viewport ---------------------------------------------------------------
@@ -182,7 +187,12 @@ class OCTO_MOTION_OT_pose_start(SessionOperator, bpy.types.Operator):
         self._controls = PoseControls(session)
         driven = len(session.puppet.rig.roles.driven)
         if driven:
-            self.report({"WARNING"}, f"Constraints or drivers move {driven} of its bones")
+            self.report(
+                {"WARNING"},
+                reported(
+                    phrase("Constraints or drivers move {driven} of its bones", driven=driven)
+                ),
+            )
         self._last = time.perf_counter()
         tell(context, self._controls.status(), self._controls.help)
         return Overlay(self._controls)

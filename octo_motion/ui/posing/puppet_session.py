@@ -25,6 +25,7 @@ from ...blender.animation import (
 )
 from ...blender.rig import puppet_of, read_rig
 from ...core.errors import OctoMotionError, RigError, SettingsError
+from ...core.phrases import as_phrase, joined_phrases, phrase
 from ...core.posing.picking import Hit, pick
 from ...core.posing.puppet import (
     Elements,
@@ -162,7 +163,7 @@ class PosedPuppet:
         """Nail a body to its place or take the nail out; what was done, in words."""
         state = body not in self.core.pins
         self.core.pin(body, state=state)
-        return f"{self.bone(body)} {'pinned' if state else 'free again'}"
+        return phrase("{bone} pinned" if state else "{bone} free again", bone=self.bone(body))
 
     def pick(self, origin: Floats, direction: Floats, *, margin: float = 0.0) -> Hit | None:
         """The body that a ray of the world meets; the hit's point is in the puppet's metres."""
@@ -208,7 +209,7 @@ class PosedPuppet:
             self.core.change_obstacles(self.settings.obstacles(self.puppet, self.scene()))
             self.warning = ""
         except OctoMotionError as error:
-            self.warning = str(error)
+            self.warning = as_phrase(error)
 
     # --- Measuring ------------------------------------------------------------------------------
 
@@ -314,9 +315,16 @@ class KeyedPuppet(PosedPuppet):
     def words_for(self, keyed: list[str]) -> str:
         """Which bones got keys now, or why none did, for people."""
         if keyed:
-            told = f"Keyed {_counted(len(keyed), 'bone')} at frame {self.scene().frame_current}"
+            told = phrase(
+                "Keyed {bones} at frame {frame}",
+                bones=_bones(len(keyed)),
+                frame=self.scene().frame_current,
+            )
             if beneath := self.keys.layered:
-                told += f", in a layer over {beneath}, which has keys on every frame"
+                over = phrase(
+                    ", in a layer over {beneath}, which has keys on every frame", beneath=beneath
+                )
+                return joined_phrases("", (told, over))
             return told
         if self.core.touched():
             return "Nothing keyed: by the settings of keying, no bone needs or takes a key"
@@ -363,7 +371,7 @@ class PuppetSession(KeyedPuppet):
         going_on = active_session()
         if going_on is not None:
             raise RigError(
-                f"'{going_on.puppet.name}' is being posed already.",
+                phrase("'{puppet}' is being posed already.", puppet=going_on.puppet.name),
                 "End that session first, with Enter or Esc over its viewport.",
             )
         super().__init__(armature, scene, clock)
@@ -418,7 +426,10 @@ class PuppetSession(KeyedPuppet):
             raise trouble
         armature = self.puppet.armature()
         if self.is_edited():
-            raise RigError(f"'{armature.name}' is in edit mode.", "Leave it and start again.")
+            raise RigError(
+                phrase("'{armature}' is in edit mode.", armature=armature.name),
+                "Leave it and start again.",
+            )
         self.apply_settings(armature)
         if self._recording is None and self.puppet.is_moved():
             # By hand, at the same frame.
@@ -467,7 +478,11 @@ class PuppetSession(KeyedPuppet):
         """
         if self.recording:
             bones, frames = self.stop_record()
-            return f"Recorded {_counted(bones, 'bone')} on {_counted(frames, 'key frame')}"
+            return phrase(
+                "Recorded {bones} on {frames}",
+                bones=_bones(bones),
+                frames=_key_frames(frames),
+            )
         self.record()
         return "Recording while the frames go by: play, and drag"
 
@@ -622,5 +637,9 @@ class PuppetSession(KeyedPuppet):
         self.puppet.write(self.core.pose)
 
 
-def _counted(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
+def _bones(count: int) -> str:
+    return phrase("1 bone") if count == 1 else phrase("{count} bones", count=count)
+
+
+def _key_frames(count: int) -> str:
+    return phrase("1 key frame") if count == 1 else phrase("{count} key frames", count=count)

@@ -13,8 +13,10 @@ from bpy.props import StringProperty
 from ...blender.rig import active_armature
 from ...core.errors import OctoMotionError, SettingsError
 from ...core.files import read_text
+from ...core.phrases import phrase
 from ...core.posing.pose_script import PoseScript, ScriptStep, parse_script
 from ...core.rotations import IDENTITY, Floats, from_rotation_vector, multiply
+from ..language import reported
 from ..operator_base import ArmatureOperator, FileOperator
 from .properties import posing_settings
 from .puppet_session import PuppetSession
@@ -47,7 +49,12 @@ class Player:
                 getattr(self, f"_{step.do}")(step)
             except OctoMotionError as error:
                 raise SettingsError(
-                    f"Step {number} of the script cannot be done: {error.problem}", error.remedy
+                    phrase(
+                        "Step {number} of the script cannot be done: {problem}",
+                        number=number,
+                        problem=error.problem,
+                    ),
+                    error.remedy,
                 ) from error
 
     def _grab(self, step: ScriptStep) -> None:
@@ -132,12 +139,18 @@ def apply_settings(armature: bpy.types.Object, values: Any) -> None:
     for name, value in values.items():
         definition = settings.bl_rna.properties.get(name)
         if definition is None or definition.type == "POINTER" or name == "obstacle":
-            raise SettingsError(f"There is no setting '{name}' of posing.", "Check its name.")
+            raise SettingsError(
+                phrase("There is no setting '{name}' of posing.", name=name), "Check its name."
+            )
         try:
             setattr(settings, name, value)
         except (TypeError, ValueError):
             raise SettingsError(
-                f"The setting '{name}' of posing does not take {value!r}.",
+                phrase(
+                    "The setting '{name}' of posing does not take {value!r}.",
+                    name=name,
+                    value=value,
+                ),
                 "See the scripting reference.",
             ) from None
 
@@ -151,7 +164,10 @@ def play_file(armature: bpy.types.Object, scene: bpy.types.Scene, path: Path) ->
     try:
         text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
-        raise SettingsError(f"'{path.name}' cannot be read: {error}.", "Choose another.") from None
+        raise SettingsError(
+            phrase("'{path}' cannot be read: {error}.", path=path.name, error=error),
+            "Choose another.",
+        ) from None
     script = parse_script(text, path.name)
     settings: Any = posing_settings(armature)
     before = {name: getattr(settings, name) for name in script.settings if hasattr(settings, name)}
@@ -196,4 +212,9 @@ class OCTO_MOTION_OT_pose_script(FileOperator, ArmatureOperator, bpy.types.Opera
         assert context.scene is not None
         path = Path(bpy.path.abspath(self.filepath))
         player = play_file(active_armature(context), context.scene, path)
-        self.report({"INFO"}, f"Played '{path.name}': {player.keys} bones keyed.")
+        self.report(
+            {"INFO"},
+            reported(
+                phrase("Played '{path}': {keys} bones keyed.", path=path.name, keys=player.keys)
+            ),
+        )

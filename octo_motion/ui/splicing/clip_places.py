@@ -12,6 +12,7 @@ import numpy as np
 
 from ...blender.scene import ImportedClip, place_clip, room_of
 from ...core.errors import OctoMotionError
+from ...core.phrases import phrase
 from ...core.rotations import Floats
 from .bodies import height_of
 
@@ -95,8 +96,12 @@ def place_clips(
     if all(scale == 1.0 for scale in scales):
         return placed, ""
     metres = height * scene.unit_settings.scale_length
-    whose = "" if placing.height or not target[1] else f" that '{target[1]}' has"
-    return placed, f"Fitted to the height{whose}: {metres:.3g} m."
+    whose = (
+        "" if placing.height or not target[1] else phrase(" that '{target}' has", target=target[1])
+    )
+    return placed, phrase(
+        "Fitted to the height{whose}: {metres:.3g} m.", whose=whose, metres=metres
+    )
 
 
 def _scale(clip: ImportedClip, fit: Fit, height: float) -> float:

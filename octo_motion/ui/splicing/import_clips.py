@@ -20,7 +20,9 @@ from bpy.props import (
 
 from ...blender.scene import ImportedClip, Up, import_clip, remove_clips, show_selected
 from ...core.errors import ClipError, OctoMotionError
+from ...core.phrases import as_phrase, joined_phrases, phrase
 from ...core.splicing.clip import MOTION_SUFFIXES
+from ..language import reported
 from ..modal_job import ModalJob
 from ..operator_base import window_manager
 from .bodies import saved_landmarks
@@ -75,7 +77,12 @@ class ImportSession:
         """The file whose turn it is, for people."""
         number = len(self.clips) + len(self.refused)
         path = self._paths[min(number, len(self._paths) - 1)]
-        return f"'{path.name}' ({min(number + 1, len(self._paths))} of {len(self._paths)})"
+        return phrase(
+            "'{path}' ({number} of {count})",
+            path=path.name,
+            number=min(number + 1, len(self._paths)),
+            count=len(self._paths),
+        )
 
     def steps(self, progress: Callable[[float], None] = lambda _: None) -> Iterator[float]:
         """Import them file by file; yields the share of the work that is done, and calls
@@ -104,8 +111,17 @@ class ImportSession:
         """
         if not self.clips:
             path, error = self.refused[0]
-            more = f" {len(self.refused) - 1} more were refused." if len(self.refused) > 1 else ""
-            raise ClipError(f"'{path.name}' was not imported. {error.problem}", error.remedy + more)
+            more = (
+                phrase(" {count} more were refused.", count=len(self.refused) - 1)
+                if len(self.refused) > 1
+                else ""
+            )
+            raise ClipError(
+                phrase(
+                    "'{path}' was not imported. {problem}", path=path.name, problem=error.problem
+                ),
+                joined_phrases("", (error.remedy, more)),
+            )
         context = bpy.context
         self.clips, self.placed = place_clips(self.clips, context, self._placing, self._target)
         names = [name for clip in self.clips for name in clip.armatures]
@@ -117,7 +133,11 @@ class ImportSession:
                 mappings[saved.mapping] = None
             self.damaged = saved.damaged
         if mappings:
-            self.placed = f"{self.placed} Mapping: {', '.join(mappings)} (saved).".strip()
+            self.placed = phrase(
+                "{placed} Mapping: {mappings} (saved).",
+                placed=self.placed,
+                mappings=", ".join(mappings),
+            ).strip()
         _select(names)
         return self
 
@@ -289,7 +309,7 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
         try:
             self._session = self._new_session(context)
         except OctoMotionError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, reported(error))
             return {"CANCELLED"}
         return self.begin(context, self._session.steps(manager.progress_update))
 
@@ -299,7 +319,7 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
 
     def status(self, progress: float) -> str:  # noqa: ARG002
         assert self._session is not None
-        return f"Importing {self._session.current}    Esc: none of them"
+        return phrase("Importing {current}    Esc: none of them", current=self._session.current)
 
     def take_back(self) -> None:
         if self._session is not None:
@@ -307,18 +327,28 @@ class OCTO_MOTION_OT_import_clips(ModalJob, bpy.types.Operator):
 
     def _report(self, session: ImportSession) -> None:
         count = len(session.clips)
-        message = f"{count} {'clip' if count == 1 else 'clips'} imported"
-        if session.refused:
-            message += f", {len(session.refused)} refused"
-        self.report({"INFO"}, f"{message}. {session.placed}".rstrip())
+        told = (
+            phrase("1 clip imported")
+            if count == 1
+            else phrase("{count} clips imported", count=count)
+        )
+        refused = phrase(", {count} refused", count=len(session.refused)) if session.refused else ""
+        told = phrase("{told}{refused}.", told=told, refused=refused)
+        self.report({"INFO"}, reported(joined_phrases(" ", (told, session.placed.strip()))))
         # Blender's status bar keeps the last, which is to be the one that says most.
         for each in session.damaged:
-            self.report({"WARNING"}, each)
+            self.report({"WARNING"}, reported(each))
         for clip in session.clips:
             for note in clip.notes:
-                self.report({"WARNING"}, f"'{clip.file}': {note}")
+                self.report(
+                    {"WARNING"},
+                    reported(phrase("'{clip}': {note}", clip=clip.file, note=as_phrase(note))),
+                )
         for path, error in session.refused:
-            self.report({"WARNING"}, f"'{path.name}' was not imported. {error}")
+            self.report(
+                {"WARNING"},
+                reported(phrase("'{path}' was not imported. {error}", path=path.name, error=error)),
+            )
 
 
 def draw_in_import_menu(menu: bpy.types.Menu, context: bpy.types.Context) -> None:  # noqa: ARG001

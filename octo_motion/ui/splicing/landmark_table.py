@@ -15,7 +15,9 @@ from bpy.props import BoolProperty, EnumProperty
 
 from ...blender.rig import armature_data, read_skeleton
 from ...core.errors import RigError
+from ...core.phrases import as_phrase, joined_phrases, phrase
 from ...core.splicing.humanoid import LANDMARKS, MIDDLE, OPTIONAL, SIDED, map_skeleton, mirrored
+from ..language import hinted, reported
 from ..operator_base import ARMATURE, ArmaturePresetAdd
 from ..panel_base import armature_in
 from .bodies import SavedLandmarks, clip_doubts, in_motion, is_complete, saved_landmarks
@@ -57,7 +59,11 @@ class OCTO_MOTION_OT_map_skeleton(StackOperator, bpy.types.Operator):
         found = map_skeleton(read_skeleton(armature), in_motion(armature))
         if found.problem and not saved.bones:
             raise RigError(
-                f"'{armature.name}' has no landmarks. {found.problem}",
+                phrase(
+                    "'{armature}' has no landmarks. {problem}",
+                    armature=armature.name,
+                    problem=as_phrase(found.problem),
+                ),
                 "Choose an armature with two arms, two legs and a head, or fill the table by hand.",
             )
         bones = dict(saved.bones) if is_complete(saved.bones) else {}
@@ -67,15 +73,36 @@ class OCTO_MOTION_OT_map_skeleton(StackOperator, bpy.types.Operator):
         write_landmarks(settings.landmarks, bones)
         if saved.reference != "":
             write_reference(settings.landmarks, saved.reference)
-        whose = f" Mapping: {saved.mapping} (saved)." if saved.mapping else ""
-        self.report({"INFO"}, f"{len(bones)} of {len(LANDMARKS)} landmarks are set.{whose}")
+        whose = (
+            phrase(" Mapping: {mapping} (saved).", mapping=saved.mapping) if saved.mapping else ""
+        )
+        self.report(
+            {"INFO"},
+            reported(
+                phrase(
+                    "{count} of {total} landmarks are set.{whose}",
+                    count=len(bones),
+                    total=len(LANDMARKS),
+                    whose=whose,
+                )
+            ),
+        )
         asked = [each for each in found.asked if each not in bones]
         if asked:
-            names = ", ".join(title(each) for each in asked)
-            self.report({"WARNING"}, f"Choose the bones of: {names}. {found.missing[asked[0]]}")
+            names = joined_phrases(", ", map(title, asked))
+            self.report(
+                {"WARNING"},
+                reported(
+                    phrase(
+                        "Choose the bones of: {names}. {missing}",
+                        names=names,
+                        missing=as_phrase(found.missing[asked[0]]),
+                    )
+                ),
+            )
         doubts = clip_doubts(armature, read_landmarks(settings.landmarks))
         for note in (*(() if saved.mapping else found.notes), *doubts, *saved.damaged):
-            self.report({"WARNING"}, note)
+            self.report({"WARNING"}, reported(note))
 
 
 class OCTO_MOTION_OT_landmark_pick(StackOperator, bpy.types.Operator):
@@ -104,7 +131,8 @@ class OCTO_MOTION_OT_landmark_pick(StackOperator, bpy.types.Operator):
         bone = context.active_pose_bone
         if bone is None or bone.id_data != armature:
             raise RigError(
-                f"The active bone is not of '{armature.name}'.", "Click a bone of that armature."
+                phrase("The active bone is not of '{armature}'.", armature=armature.name),
+                "Click a bone of that armature.",
             )
         setattr(settings.landmarks, self.landmark, bone.name)
 
@@ -128,22 +156,34 @@ class OCTO_MOTION_OT_landmarks_mirror(StackOperator, bpy.types.Operator):
     @classmethod
     def description(cls, context: bpy.types.Context, properties: Any) -> str:  # noqa: ARG003
         """The tooltip of either button."""
-        other = "right" if properties.direction == "LEFT_TO_RIGHT" else "left"
-        return f"Fill the {other} side with the bones that are called like those of this side"
+        other = phrase("right") if properties.direction == "LEFT_TO_RIGHT" else phrase("left")
+        return hinted(
+            phrase(
+                "Fill the {other} side with the bones that are called like those of this side",
+                other=other,
+            )
+        )
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         bones = dict(read_landmarks(settings.landmarks).bones)
         source, target = ("L", "R") if self.direction == "LEFT_TO_RIGHT" else ("R", "L")
         given = {part: bones[f"{part}.{source}"] for part in SIDED if f"{part}.{source}" in bones}
-        word = {"L": "left", "R": "right"}
+        word = {"L": phrase("left"), "R": phrase("right")}
         if not given:
-            raise RigError(f"The {word[source]} side of the table is empty.", "Fill it first.")
+            raise RigError(
+                phrase("The {word} side of the table is empty.", word=word[source]),
+                "Fill it first.",
+            )
         names = [bone.name for bone in armature_data(armature).bones]
         for part, name in given.items():
             other = mirrored(names, name)
             if other is None:
                 raise RigError(
-                    f"There is no bone called like '{name}' on the {word[target]} side.",
+                    phrase(
+                        "There is no bone called like '{name}' on the {word} side.",
+                        name=name,
+                        word=word[target],
+                    ),
                     "Choose that side's bones by hand.",
                 )
             bones[f"{part}.{target}"] = other

@@ -16,7 +16,9 @@ from ...blender.files import (
 )
 from ...blender.rig import active_armature
 from ...core.errors import RigError
+from ...core.phrases import phrase
 from ...core.splicing.humanoid import new_mapping
+from ..language import reported, translated
 from ..operator_base import ArmatureOperator, window_manager
 from .bodies import REFERENCE_KEY, parents_of, saved_landmarks, saved_reference
 from .properties import (
@@ -69,7 +71,7 @@ class OCTO_MOTION_OT_mapping_save(ArmatureOperator, bpy.types.Operator):
             further[REFERENCE_KEY] = landmarks.reference
         mapping = new_mapping(name, parents_of(armature), landmarks, further)
         save_mapping(mapping, overwrite=self.overwrite)
-        self.report({"INFO"}, f"Saved the mapping '{name}'.")
+        self.report({"INFO"}, reported(phrase("Saved the mapping '{name}'.", name=name)))
 
 
 def _further(name: str) -> dict[str, Any]:
@@ -98,12 +100,16 @@ class OCTO_MOTION_OT_mapping_load(StackOperator, bpy.types.Operator):
         landmarks = mapping.on(parents_of(armature))
         if landmarks is None:
             raise RigError(
-                f"'{armature.name}' is no skeleton of the kind '{mapping.name}'.",
+                phrase(
+                    "'{armature}' is no skeleton of the kind '{mapping}'.",
+                    armature=armature.name,
+                    mapping=mapping.name,
+                ),
                 "Choose another mapping, or fill the table by hand.",
             )
         write_landmarks(settings.landmarks, landmarks.bones)
         write_reference(settings.landmarks, saved_reference(mapping.further))
-        self.report({"INFO"}, f"Mapping: {mapping.name} (saved).")
+        self.report({"INFO"}, reported(phrase("Mapping: {mapping} (saved).", mapping=mapping.name)))
 
 
 class OCTO_MOTION_OT_mapping_remove(ArmatureOperator, bpy.types.Operator):
@@ -127,7 +133,7 @@ class OCTO_MOTION_OT_mapping_remove(ArmatureOperator, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> None:
         name = self.name or saved_landmarks(active_armature(context)).mapping
         remove_mapping(name)
-        self.report({"INFO"}, f"Removed the mapping '{name}'.")
+        self.report({"INFO"}, reported(phrase("Removed the mapping '{name}'.", name=name)))
 
 
 class OCTO_MOTION_MT_mappings(bpy.types.Menu):
@@ -137,14 +143,18 @@ class OCTO_MOTION_MT_mappings(bpy.types.Menu):
     def draw(self, context: bpy.types.Context | None) -> None:  # noqa: ARG002
         layout = cast("Any", self).layout
         for name in mapping_names():
-            load = layout.operator(OCTO_MOTION_OT_mapping_load.bl_idname, text=name)
+            load = layout.operator(
+                OCTO_MOTION_OT_mapping_load.bl_idname, text=name, translate=False
+            )
             load.name = name
         layout.separator()
         layout.operator_context = "INVOKE_DEFAULT"
         layout.operator(OCTO_MOTION_OT_mapping_save.bl_idname, text="Save Mapping…", icon="ADD")
         for name in mapping_names():
             remove = layout.operator(
-                OCTO_MOTION_OT_mapping_remove.bl_idname, text=f"Remove {name}", icon="REMOVE"
+                OCTO_MOTION_OT_mapping_remove.bl_idname,
+                text=translated(phrase("Remove {name}", name=name)),
+                icon="REMOVE",
             )
             remove.name = name
 
@@ -156,7 +166,10 @@ def draw_mapping(layout: bpy.types.UILayout, settings: Any) -> None:
     if saved.mapping:
         table = read_landmarks(settings.landmarks).bones
         same = all(table.get(each, bone) == bone for each, bone in saved.bones.items())
-        text = f"Mapping: {saved.mapping} ({'saved' if same else 'changed'})"
-    layout.menu(OCTO_MOTION_MT_mappings.__name__, text=text)
+        text = phrase(
+            "Mapping: {mapping} (saved)" if same else "Mapping: {mapping} (changed)",
+            mapping=saved.mapping,
+        )
+    layout.menu(OCTO_MOTION_MT_mappings.__name__, text=translated(text))
     for sentence in saved.damaged:
-        layout.label(text=sentence, icon="ERROR")
+        layout.label(text=translated(sentence), icon="ERROR")

@@ -13,6 +13,7 @@ from typing import Any, Final
 import bpy
 
 from ...blender.rig import armature_data
+from ...core.phrases import as_phrase
 from ...core.splicing.humanoid import LANDMARKS, Landmarks, ReferenceMoment
 from ...core.splicing.transfer import CHAIN, PART_TABLE, PartKind, part_named
 from .. import declared_settings as props
@@ -90,7 +91,7 @@ PROPERTIES: Final = {each: each.replace(".", "_").lower() for each in LANDMARKS}
 def title(landmark: str) -> str:
     """What the table calls a landmark: "left hand"."""
     definition = OCTO_MOTION_PG_landmarks.bl_rna.properties[PROPERTIES[landmark]]
-    return definition.name.lower()
+    return as_phrase(definition.name.lower())
 
 
 def read_landmarks(group: Any) -> Landmarks:

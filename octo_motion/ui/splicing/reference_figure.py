@@ -12,10 +12,12 @@ import numpy as np
 from ...blender.animation import read_clip
 from ...blender.rig import world_matrix
 from ...core.errors import ClipError
+from ...core.phrases import as_phrase, phrase
 from ...core.rotations import Floats
 from ...core.splicing.clip import Clip, average_pose, with_rest_pose
 from ...core.splicing.humanoid import Landmarks
 from ...core.splicing.transfer import find_reference_pose, reference_doubts
+from ..language import reported
 from ..overlay_lines import draw_lines
 from .bodies import known_landmarks
 from .splice_operators import StackOperator
@@ -131,7 +133,12 @@ class OCTO_MOTION_OT_reference_show(StackOperator, bpy.types.Operator):
         known = known_landmarks(armature, clip.skeleton, average_pose(clip))
         if known.landmarks is None:
             raise ClipError(
-                f"'{armature.name}' has no landmarks. {known.problem}", "Fill the table."
+                phrase(
+                    "'{armature}' has no landmarks. {problem}",
+                    armature=armature.name,
+                    problem=as_phrase(known.problem),
+                ),
+                "Fill the table.",
             )
         lines = figure_lines(clip, known.landmarks)
         _shown[name] = bpy.types.SpaceView3D.draw_handler_add(
@@ -139,6 +146,6 @@ class OCTO_MOTION_OT_reference_show(StackOperator, bpy.types.Operator):
         )
         doubts = reference_doubts(clip, known.landmarks)
         for each in doubts:
-            self.report({"WARNING"}, each)
+            self.report({"WARNING"}, reported(each))
         if not doubts:
             self.report({"INFO"}, "Joints tell how this body stands.")

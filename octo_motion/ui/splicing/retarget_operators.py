@@ -15,7 +15,9 @@ from bpy.props import BoolProperty, CollectionProperty, IntProperty, StringPrope
 from ...blender.animation import actions_for, writable_armature
 from ...blender.rig import active_armature
 from ...core.errors import ClipError, OctoMotionError
+from ...core.phrases import phrase
 from ...core.splicing.clip import MOTION_SUFFIXES
+from ..language import reported
 from ..modal_job import ModalJob
 from ..operator_base import window_manager, without_armature
 from .retargeting import (
@@ -60,7 +62,7 @@ class _RetargetOperator(ModalJob):
         try:
             self._session = self.session(context)
         except OctoMotionError as error:
-            self.report({"ERROR"}, str(error))  # type: ignore[attr-defined]
+            self.report({"ERROR"}, reported(error))  # type: ignore[attr-defined]
             return {"CANCELLED"}
         return self.begin(context, self._session.steps(), patience=0.3)
 
@@ -70,15 +72,18 @@ class _RetargetOperator(ModalJob):
 
     def status(self, progress: float) -> str:  # noqa: ARG002
         assert self._session is not None
-        return f"Retargeting {self._session.current}    Esc: none of them"
+        return phrase("Retargeting {current}    Esc: none of them", current=self._session.current)
 
     def _report(self, session: RetargetSession) -> None:
         told = cast("bpy.types.Operator", self)
-        told.report({"INFO"}, session.message)
+        told.report({"INFO"}, reported(session.message))
         for warning in dict.fromkeys(each for made in session.made for each in made.warnings):
-            told.report({"WARNING"}, warning)
+            told.report({"WARNING"}, reported(warning))
         for name, error in session.refused:
-            told.report({"WARNING"}, f"'{name}' was not retargeted. {error}")
+            told.report(
+                {"WARNING"},
+                reported(phrase("'{name}' was not retargeted. {error}", name=name, error=error)),
+            )
 
 
 class OCTO_MOTION_OT_retarget(_RetargetOperator, bpy.types.Operator):
@@ -135,12 +140,16 @@ class OCTO_MOTION_OT_retarget(_RetargetOperator, bpy.types.Operator):
         if self.action:
             action = bpy.data.actions.get(self.action)
             if action is None:
-                raise ClipError(f"There is no action '{self.action}'.", "Choose the clip's action.")
+                raise ClipError(
+                    phrase("There is no action '{action}'.", action=self.action),
+                    "Choose the clip's action.",
+                )
             return [(action, "")]
         own = own_action(source)
         if own is None:
             raise ClipError(
-                f"The source '{source.name}' has no action.", "Give it one, or choose an action."
+                phrase("The source '{source}' has no action.", source=source.name),
+                "Give it one, or choose an action.",
             )
         return [own]
 
@@ -156,16 +165,26 @@ def source_armature(
     if name:
         found = bpy.data.objects.get(name)
         if found is None or found.type != "ARMATURE":
-            raise ClipError(f"There is no armature '{name}'.", "Choose the armature of the clip.")
+            raise ClipError(
+                phrase("There is no armature '{name}'.", name=name),
+                "Choose the armature of the clip.",
+            )
         check_source(armature, found)
         return found
     others = other_armatures(context)
     if len(others) == 1:
         return others[0]
-    problem = f"{len(others)} other armatures are selected." if others else "No source is selected."
+    problem = (
+        phrase("{count} other armatures are selected.", count=len(others))
+        if others
+        else "No source is selected."
+    )
     raise ClipError(
         problem,
-        f"Select the armature with the clip, then Shift click '{armature.name}', which gets it.",
+        phrase(
+            "Select the armature with the clip, then Shift click '{armature}', which gets it.",
+            armature=armature.name,
+        ),
     )
 
 
@@ -266,7 +285,10 @@ def motion_files(folder: Path) -> list[Path]:
         ClipError: there is no such folder, or it has none.
     """
     if not folder.is_dir():
-        raise ClipError(f"There is no folder '{folder}'.", "Choose a folder with motion files.")
+        raise ClipError(
+            phrase("There is no folder '{folder}'.", folder=folder),
+            "Choose a folder with motion files.",
+        )
     found = sorted(
         each
         for each in folder.iterdir()
@@ -274,6 +296,7 @@ def motion_files(folder: Path) -> list[Path]:
     )
     if not found:
         raise ClipError(
-            f"The folder '{folder.name}' has no motion files.", "BVH, FBX and glTF files are."
+            phrase("The folder '{folder}' has no motion files.", folder=folder.name),
+            "BVH, FBX and glTF files are.",
         )
     return found

@@ -25,6 +25,7 @@ from ...blender.animation import (
 from ...blender.scene import import_clip, read_triangles, remove_clips
 from ...core.errors import ClipError, OctoMotionError, WriteError
 from ...core.locomotion.ground import Ground, sample_ground
+from ...core.phrases import as_phrase, joined_phrases, phrase
 from ...core.rotations import Floats
 from ...core.splicing.clip import Clip, average_pose
 from ...core.splicing.humanoid import LANDMARKS, OPTIONAL
@@ -104,7 +105,7 @@ class Retargeted:
     @property
     def message(self) -> str:
         """One sentence."""
-        return f"{self.frames} frames: '{self.action}'."
+        return phrase("{frames} frames: '{action}'.", frames=self.frames, action=self.action)
 
 
 def prepare_retarget(
@@ -158,7 +159,7 @@ def check_source(armature: bpy.types.Object, source: bpy.types.Object) -> None:
     """
     if source == armature:
         raise ClipError(
-            f"'{armature.name}' is both source and target.",
+            phrase("'{armature}' is both source and target.", armature=armature.name),
             "Select the armature with the clip, then Shift click the one that gets it.",
         )
 
@@ -220,11 +221,20 @@ def _check_landmarks(source: Source) -> None:
     known = {} if source.landmarks is None else source.landmarks.bones
     missing = [each for each in LANDMARKS if each not in OPTIONAL and known.get(each) not in bones]
     if missing:
-        problem = source.problem or f"It is not known which bone is the {title(missing[0])}."
+        problem = source.problem or phrase(
+            "It is not known which bone is the {landmark}.", landmark=title(missing[0])
+        )
         raise ClipError(
-            f"'{source.armature}' has no landmarks. {problem}",
-            f"Make '{source.armature}' active, click Find Landmarks in the panel Splice > "
-            "Landmarks and choose there what it cannot find.",
+            phrase(
+                "'{armature}' has no landmarks. {problem}",
+                armature=source.armature,
+                problem=as_phrase(problem),
+            ),
+            phrase(
+                "Make '{armature}' active, click Find Landmarks in the panel Splice > Landmarks "
+                "and choose there what it cannot find.",
+                armature=source.armature,
+            ),
         )
 
 
@@ -281,9 +291,10 @@ def _warnings(job: RetargetJob) -> Iterator[str]:
     held = [bone for bone in moved if skeleton.constrained[skeleton.index[bone]]]
     if held:
         listed = ", ".join(f"'{each}'" for each in held[:3])
-        yield (
-            f"Constraints or drivers act on {listed}{' and others' if held[3:] else ''}: mute them "
-            "if the clip does not show."
+        yield phrase(
+            "Constraints or drivers act on {listed}{others}: mute them if the clip does not show.",
+            listed=listed,
+            others=phrase(" and others") if held[3:] else "",
         )
 
 
@@ -316,7 +327,12 @@ class RetargetSession:
         """The clip whose turn it is, for people."""
         count = len(self._clips)
         number = min(len(self._results) + len(self.refused), count - 1)
-        return f"'{self._clips[number][0]}' ({number + 1} of {count})"
+        return phrase(
+            "'{clip}' ({number} of {count})",
+            clip=self._clips[number][0],
+            number=number + 1,
+            count=count,
+        )
 
     def steps(self) -> Iterator[float]:
         """Work them out; yields the share of the work that is done."""
@@ -338,8 +354,15 @@ class RetargetSession:
         """
         if not self._results:
             name, error = self.refused[0]
-            more = f" {len(self.refused) - 1} more were refused." if self.refused[1:] else ""
-            raise ClipError(f"'{name}': {error.problem}", error.remedy + more)
+            more = (
+                phrase(" {count} more were refused.", count=len(self.refused) - 1)
+                if self.refused[1:]
+                else ""
+            )
+            raise ClipError(
+                phrase("'{name}': {problem}", name=name, problem=error.problem),
+                joined_phrases("", (error.remedy, more)),
+            )
         # The first one last: that is the one that the armature has in the end.
         for name, job, clip in self._results[::-1]:
             self.made.append(write_retargeted_clip(job, clip, name))
@@ -353,9 +376,17 @@ class RetargetSession:
         count, frames = len(self.made), sum(each.frames for each in self.made)
         names = ", ".join(f"'{each.action}'" for each in self.made[:3])
         more = " …" if self.made[3:] else ""
-        refused = f" {len(self.refused)} refused." if self.refused else ""
-        word = "clip" if count == 1 else "clips"
-        return f"{count} {word}, {frames} frames: {names}{more}.{refused}"
+        refused = phrase(" {count} refused.", count=len(self.refused)) if self.refused else ""
+        word = phrase("clip") if count == 1 else phrase("clips")
+        return phrase(
+            "{count} {word}, {frames} frames: {names}{more}.{refused}",
+            count=count,
+            word=word,
+            frames=frames,
+            names=names,
+            more=more,
+            refused=refused,
+        )
 
 
 def file_clip(
@@ -386,7 +417,7 @@ def file_clip(
             source = bpy.data.objects[imported.armatures[0]]
             if len(imported.armatures) > 1:
                 raise ClipError(
-                    f"The file has {len(imported.armatures)} armatures.",
+                    phrase("The file has {count} armatures.", count=len(imported.armatures)),
                     "Import it, and choose the armature there.",
                 )
             if landmarks:

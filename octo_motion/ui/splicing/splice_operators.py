@@ -12,8 +12,10 @@ from bpy.props import EnumProperty, IntProperty, StringProperty
 from ...blender.animation import scene_rate, writable_armature
 from ...blender.rig import active_armature
 from ...core.errors import ClipError
+from ...core.phrases import joined_phrases, phrase
 from ...core.rotations import Floats
 from ..declared_settings import assign
+from ..language import reported, translated
 from ..operator_base import (
     ItemOperator,
     ListKind,
@@ -195,13 +197,14 @@ class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
             found = bpy.data.objects.get(self.source)
             if found is None or found.type != "ARMATURE":
                 raise ClipError(
-                    f"There is no armature '{self.source}'.", "Choose the armature of the clip."
+                    phrase("There is no armature '{source}'.", source=self.source),
+                    "Choose the armature of the clip.",
                 )
             return found
         others = other_armatures(context)
         if len(others) > 1:
             raise ClipError(
-                f"{len(others)} other armatures are selected.",
+                phrase("{count} other armatures are selected.", count=len(others)),
                 "Select the one with the clip, then Shift click the one that gets it.",
             )
         if others:
@@ -220,16 +223,21 @@ class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
         if self.action:
             action = bpy.data.actions.get(self.action)
             if action is None:
-                raise ClipError(f"There is no action '{self.action}'.", "Choose the clip's action.")
+                raise ClipError(
+                    phrase("There is no action '{action}'.", action=self.action),
+                    "Choose the clip's action.",
+                )
             return action, ""
         own = own_action(source)
         if own is None:
             raise ClipError(
-                f"The source '{source.name}' has no action.", "Give it one, or choose an action."
+                phrase("The source '{source}' has no action.", source=source.name),
+                "Give it one, or choose an action.",
             )
         if source == armature:
             raise ClipError(
-                f"'{source.name}' is both base and source.", "Choose the action of the source."
+                phrase("'{source}' is both base and source.", source=source.name),
+                "Choose the action of the source.",
             )
         return own
 
@@ -281,7 +289,8 @@ def _base(armature: bpy.types.Object, settings: Any) -> tuple[bpy.types.Action, 
     own = own_action(armature)
     if own is None:
         raise ClipError(
-            f"'{armature.name}' has no action to splice onto.", "Give it one, or choose the base."
+            phrase("'{armature}' has no action to splice onto.", armature=armature.name),
+            "Give it one, or choose the base.",
         )
     return own
 
@@ -337,11 +346,20 @@ class OCTO_MOTION_OT_splice_suggest_timing(SpliceOperator, bpy.types.Operator):
         starts = chosen.base_start, settings.splices[number].splice_start
         made = build_retimed(armature, settings, number, starts, stack)
         lines = [
-            f"{rank}: frame {each.base_start:g} ({each.cost:.2f} leg lengths apart)"
+            phrase(
+                "{rank}: frame {start:g} ({cost:.2f} leg lengths apart)",
+                rank=rank,
+                start=each.base_start,
+                cost=each.cost,
+            )
             for rank, each in enumerate(found, 1)
         ]
-        self.found = "\n".join(lines)
-        message = f"Begins at {chosen.base_start:g}. Best first: {'; '.join(lines)}."
+        self.found = "\n".join(map(translated, lines))
+        message = phrase(
+            "Begins at {start:g}. Best first: {lines}.",
+            start=chosen.base_start,
+            lines=joined_phrases("; ", lines),
+        )
         report_built(self, made, message)
 
 
@@ -367,6 +385,6 @@ def build_retimed(
 
 def report_built(operator: bpy.types.Operator, made: SpliceSummary, message: str = "") -> None:
     """Report what was made, and then, to stay on screen, what is to be looked at."""
-    operator.report({"INFO"}, message or made.message)
+    operator.report({"INFO"}, reported(message or made.message))
     for each in made.warnings:
-        operator.report({"WARNING"}, each)
+        operator.report({"WARNING"}, reported(each))

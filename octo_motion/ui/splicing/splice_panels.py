@@ -7,6 +7,8 @@ from typing import Any, Final
 
 import bpy
 
+from ...core.phrases import phrase
+from ..language import translated
 from ..panel_base import ArmaturePanel, armature_in, draw_list
 from .landmark_table import draw_landmarks
 from .properties import part_kind, splicing_settings
@@ -69,7 +71,7 @@ class OCTO_MOTION_PT_splicing(_Panel, bpy.types.Panel):
         layout.row().prop(settings, "result_as", expand=True)
         layout.prop(settings, "visual")
         if settings.result is not None:
-            layout.label(text=settings.result.name, icon="ACTION")
+            layout.label(text=settings.result.name, icon="ACTION", translate=False)
 
 
 class OCTO_MOTION_PT_splice(_SplicePanel, bpy.types.Panel):
@@ -141,7 +143,10 @@ class OCTO_MOTION_PT_splice_timing(_SplicePanel, bpy.types.Panel):
         if item.match_markers:
             matched = len(matched_markers(settings, item))
             icon = "PMARKER_ACT" if matched else "ERROR"
-            layout.label(text=f"Markers of the same name: {matched}", icon=icon)
+            layout.label(
+                text=translated(phrase("Markers of the same name: {matched}", matched=matched)),
+                icon=icon,
+            )
         layout.prop(item, "length")
         layout.row().prop(item, "fade_unit", expand=True)
         ease_in, ease_out = "ease_in", "ease_out"

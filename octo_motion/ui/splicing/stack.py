@@ -32,6 +32,7 @@ from ...blender.animation import (
 from ...blender.rig import armature_data
 from ...core.errors import ClipError, OctoMotionError, WriteError
 from ...core.locomotion.ground import Ground
+from ...core.phrases import as_phrase, joined_phrases, phrase
 from ...core.splicing.clip import (
     Clip,
     average_pose,
@@ -88,7 +89,15 @@ class ListedSpliceError(ClipError):
     """A splice of an armature's list cannot be built: says which, for people and for the panel."""
 
     def __init__(self, armature: str, number: int, name: str, error: OctoMotionError) -> None:
-        super().__init__(f"'{name}' ({number + 1}): {error.problem}", error.remedy)
+        super().__init__(
+            phrase(
+                "'{name}' ({number}): {problem}",
+                name=name,
+                number=number + 1,
+                problem=error.problem,
+            ),
+            error.remedy,
+        )
         self.armature = armature
         self.number = number
         """Its place in the list, counted from 0."""
@@ -191,10 +200,18 @@ class SpliceSummary:
     def message(self) -> str:
         """One sentence, and where landmarks are from."""
         if self.splices == 0:
-            return f"'{self.action}': all splices are muted, so it is the base again."
-        word = "splice" if self.splices == 1 else "splices"
-        made = f"{self.splices} {word} on {self.frames} frames: '{self.action}'."
-        return " ".join([made, *self.mappings])
+            return phrase(
+                "'{action}': all splices are muted, so it is the base again.", action=self.action
+            )
+        word = phrase("splice") if self.splices == 1 else phrase("splices")
+        made = phrase(
+            "{splices} {word} on {frames} frames: '{action}'.",
+            splices=self.splices,
+            word=word,
+            frames=self.frames,
+            action=self.action,
+        )
+        return joined_phrases(" ", (made, *self.mappings))
 
 
 # --- Reading -------------------------------------------------------------------------------------
@@ -214,7 +231,8 @@ def prepare_splices(armature: bpy.types.Object, *, between: bool = True) -> Stac
     writable_armature(armature)
     if len(settings.splices) == 0:
         raise ClipError(
-            f"'{armature.name}' has no splices.", "Add one in the panel Splice (Add Splice)."
+            phrase("'{armature}' has no splices.", armature=armature.name),
+            "Add one in the panel Splice (Add Splice).",
         )
     reader = ClipReader()
     base = reader.base(armature)
@@ -229,7 +247,10 @@ def prepare_splices(armature: bpy.types.Object, *, between: bool = True) -> Stac
         base,
         tuple(splices),
         tuple(settings.splices.keys()),
-        tuple(f"Mapping of '{whose}': {name} (saved)." for whose, name in reader.mappings.items()),
+        tuple(
+            phrase("Mapping of '{whose}': {name} (saved).", whose=whose, name=name)
+            for whose, name in reader.mappings.items()
+        ),
         tuple(reader.damaged),
     )
     return read_between(stack) if between else stack
@@ -297,7 +318,7 @@ class ClipReader:
         settings = splicing_settings(armature)
         if settings.base is None:
             raise ClipError(
-                f"'{armature.name}' has no base action, or it is gone.",
+                phrase("'{armature}' has no base action, or it is gone.", armature=armature.name),
                 "Choose the base in the panel Splice.",
             )
         if settings.visual and settings.result_as == "LAYER":
@@ -345,7 +366,11 @@ class ClipReader:
                 chosen = action.slots.get(slot)
                 if chosen is None:
                     raise ClipError(
-                        f"Action '{action.name}' has no slot '{slot[2:]}'.",
+                        phrase(
+                            "Action '{action}' has no slot '{slot}'.",
+                            action=action.name,
+                            slot=slot[2:],
+                        ),
                         "Choose one of its slots in the panel Splice, or leave the slot empty.",
                     )
             clip = read_clip(armature, action, chosen, visual=visual)
@@ -374,7 +399,10 @@ def _check_mixing(armature: bpy.types.Object) -> None:
         return
     if data.action_blend_type != "REPLACE" or data.action_influence < 1.0:
         raise ClipError(
-            f"As shown, the base would be mixed with the NLA tracks of '{armature.name}' twice.",
+            phrase(
+                "As shown, the base would be mixed with the NLA tracks of '{armature}' twice.",
+                armature=armature.name,
+            ),
             "In the NLA editor set the action's Blending to Replace and its Influence to 1, mute "
             "the tracks, or turn off Base As Shown.",
         )
@@ -437,7 +465,11 @@ def _part(item: Any, base: Source, source: Source) -> Part:
     for each, bone in ((base, part.root), (source, part.splice_root)):
         if bone not in each.clip.skeleton.index:
             raise ClipError(
-                f"'{each.armature}' has no bone '{bone}', the first of its chain.",
+                phrase(
+                    "'{armature}' has no bone '{bone}', the first of its chain.",
+                    armature=each.armature,
+                    bone=bone,
+                ),
                 "Choose the first bones in the panel Splice.",
             )
     return part
@@ -445,12 +477,20 @@ def _part(item: Any, base: Source, source: Source) -> Part:
 
 def _check_landmarks(splice: Splice, source: Source) -> None:
     """Ask for what cannot be told, with the name of whose it is."""
-    remedy = (
-        f"Make '{source.armature}' active, click Find Landmarks in the panel Splice > Landmarks "
-        "and choose there what it cannot find."
+    remedy = phrase(
+        "Make '{armature}' active, click Find Landmarks in the panel Splice > Landmarks and "
+        "choose there what it cannot find.",
+        armature=source.armature,
     )
     if source.landmarks is None:
-        raise ClipError(f"'{source.armature}' has no landmarks. {source.problem}", remedy)
+        raise ClipError(
+            phrase(
+                "'{armature}' has no landmarks. {problem}",
+                armature=source.armature,
+                problem=as_phrase(source.problem),
+            ),
+            remedy,
+        )
     part = splice.part
     if splice.mirror and source.clip is splice.clip:
         # What the clip has to have is on its other side.
@@ -464,7 +504,10 @@ def _check_landmarks(splice: Splice, source: Source) -> None:
         asked = any(known.get(each) not in bones for each in LANDMARKS if each not in OPTIONAL)
         # With all landmarks there, it is the rig that does not serve.
         remedy = remedy if asked else error.remedy
-        raise ClipError(f"'{source.armature}': {error.problem}", remedy) from None
+        raise ClipError(
+            phrase("'{armature}': {problem}", armature=source.armature, problem=error.problem),
+            remedy,
+        ) from None
 
 
 def suggestions(stack: Stack, number: int, count: int) -> list[Suggestion]:
@@ -522,13 +565,22 @@ def write_splices(stack: Stack, motion: SplicedMotion) -> SpliceSummary:
     warnings = list(_warnings(stack, settings.splices))
     if stack.base.clip.cyclic and not cyclic:
         warnings.append(
-            f"'{stack.base.clip.name}' is a cycle, but '{action.name}' ends in another pose than "
-            "it begins in: it does not repeat."
+            phrase(
+                "'{clip}' is a cycle, but '{action}' ends in another pose than it begins in: it "
+                "does not repeat.",
+                clip=stack.base.clip.name,
+                action=action.name,
+            )
         )
     lost = stack.resized
     if lost:
-        verbs = "is scaled and loses its" if len(lost) == 1 else "are scaled and lose their"
-        warnings.append(f"{_listed(lost)} {verbs} size: of what they carry a part is spliced.")
+        told = phrase(
+            "{bones} is scaled and loses its size: of what it carries a part is spliced."
+            if len(lost) == 1
+            else "{bones} are scaled and lose their size: of what they carry a part is spliced.",
+            bones=_listed(lost),
+        )
+        warnings.append(told)
     warnings += stack.damaged
     frames = len(stack.base.clip)
     return SpliceSummary(action.name, frames, len(stack.acting), tuple(warnings), stack.mappings)
@@ -585,22 +637,34 @@ def _warnings(stack: Stack, items: Any) -> Iterator[str]:
             continue
         timing, clip = splice.timing, splice.clip
         if splice.weight is not None and not splice.weight[1].any():
-            yield f"'{item.name}' changes nothing: its weight is 0."
+            yield phrase("'{item}' changes nothing: its weight is 0.", item=item.name)
         elif not splice_window(timing, base, clip).weights.any():
-            whose, start, frames = ", and the base", timing.base_start, base.frames
+            whose, start = phrase(", and the base"), timing.base_start
+            frames = base.frames
             if timing.after == "stop" and timing.splice_start >= clip.frames[-1]:
-                whose = " of its clip, which"
+                whose = phrase(" of its clip, which")
                 start, frames = timing.splice_start, clip.frames
             yield (
-                f"'{item.name}' changes nothing: it begins at frame {start:g}"
-                f"{whose} has frames {frames[0]:g} to {frames[-1]:g}."
+                phrase(
+                    "'{item}' changes nothing: it begins at frame {start:g}{whose} has frames "
+                    "{first:g} to {last:g}.",
+                    item=item.name,
+                    start=start,
+                    whose=whose,
+                    first=frames[0],
+                    last=frames[-1],
+                )
             )
         constrained |= dict.fromkeys(_constrained(stack.base, splice))
     if constrained:
         whose = "its" if len(constrained) == 1 else "their"
         yield (
-            f"Constraints or drivers act on {_listed(constrained)} after {whose} keys: mute them "
-            "if the splice does not show."
+            phrase(
+                "Constraints or drivers act on {listed} after {whose} keys: mute them if the "
+                "splice does not show.",
+                listed=_listed(constrained),
+                whose=whose,
+            )
         )
 
 
@@ -643,5 +707,5 @@ def local_object(name: str) -> bpy.types.Object:
         found = bpy.data.objects[name, None]  # type: ignore[index]
         armature_data(found)
     except KeyError:
-        raise WriteError(f"'{name}' is gone.", "Build again.") from None
+        raise WriteError(phrase("'{name}' is gone.", name=name), "Build again.") from None
     return found

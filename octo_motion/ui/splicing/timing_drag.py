@@ -17,7 +17,9 @@ from bpy.props import FloatProperty
 from ...blender.animation import pose_values, restore_pose, show_pose, writable_armature
 from ...blender.rig import active_armature
 from ...core.errors import ClipError, OctoMotionError, WriteError
+from ...core.phrases import phrase
 from .. import at_work
+from ..language import reported, translated
 from .properties import splicing_settings
 from .splice_operators import SpliceOperator, active_splice, build_retimed, report_built
 from .stack import ListedSpliceError, Stack, local_object, prepare_splices
@@ -93,9 +95,11 @@ class TimingDrag:
         if self.typed:
             shown[self.handle] = f"[{self.typed}|]"
         marks = {name: "▸ " if name == self.handle else "" for name in shown}
-        return (
-            f"{marks['base']}Base Start: {shown['base']}    "
-            f"{marks['splice']}Clip Start: {shown['splice']}"
+        return phrase(
+            "{mark}Base Start: {base}    {other_mark}Clip Start: {splice}",
+            mark=marks["base"],
+            other_mark=marks["splice"],
+            **shown,
         )
 
 
@@ -300,7 +304,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         self._tear_down(context)
         if isinstance(error, ListedSpliceError):
             error.select()
-        self.report({"ERROR"}, str(error))
+        self.report({"ERROR"}, reported(error))
         return {"CANCELLED"}
 
     def _tear_down(self, context: bpy.types.Context) -> None:
@@ -316,11 +320,13 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
 def _write(context: bpy.types.Context, header: str | None, status: str | None) -> None:
     """Write into the area's header and the status bar, or give them back."""
     if context.area is not None:
-        context.area.header_text_set(header)
+        context.area.header_text_set(None if header is None else translated(header))
     if context.workspace is not None:
-        context.workspace.status_text_set(status)
+        context.workspace.status_text_set(None if status is None else translated(status))
 
 
 def _check_shown(item: Any) -> None:
     if item.mute:
-        raise ClipError(f"Splice '{item.name}' is muted.", "Unmute it, then drag its timing.")
+        raise ClipError(
+            phrase("Splice '{item}' is muted.", item=item.name), "Unmute it, then drag its timing."
+        )

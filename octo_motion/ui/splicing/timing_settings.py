@@ -11,6 +11,7 @@ import numpy as np
 
 from ...blender.animation import setting_values
 from ...core.errors import ClipError
+from ...core.phrases import phrase
 from ...core.rotations import Floats
 from ...core.splicing.clip import After, Clip, MarkerPair, RateCurve, Timing
 
@@ -114,6 +115,9 @@ def _keyed(settings: Any, item: Any, name: str, frames: Floats) -> tuple[Floats,
     if values is None:
         return None
     if not np.isfinite(values).all():
-        raise ClipError(f"The keys of its {name} are no finite numbers.", "Repair or delete them.")
+        raise ClipError(
+            phrase("The keys of its {name} are no finite numbers.", name=name),
+            "Repair or delete them.",
+        )
     limits = item.bl_rna.properties[name]
     return looks, np.clip(values, limits.hard_min, limits.hard_max)

@@ -221,7 +221,7 @@ class Drawn:
     def row(self, **_: Any) -> "Drawn":
         return self
 
-    def label(self, *, text: str, icon: str) -> None:
+    def label(self, *, text: str, icon: str, translate: bool = True) -> None:  # noqa: ARG002
         self.labels.append(text)
         if icon == "ERROR":
             self.warned.append(text)

@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from ...phrases import phrase
 from ...rotations import (
     Floats,
     components_first,
@@ -332,9 +333,11 @@ class BodyVolume:
         """Why arms cannot be kept apart over so many frames, "" if they can."""
         if self._distances(frames) <= _MOST_PARTED:
             return ""
-        return (
-            f"Arms are not kept apart: {len(self.arms)} arms over {frames:,} frames would take too "
-            "long. Make shorter motions, or switch arms off."
+        return phrase(
+            "Arms are not kept apart: {count} arms over {frames:,} frames would take too "
+            "long. Make shorter motions, or switch arms off.",
+            count=len(self.arms),
+            frames=frames,
         )
 
     def measure(self, rotations: Floats, strains: Floats) -> tuple[Separation, int]:
@@ -370,11 +373,15 @@ class BodyVolume:
         if worst is None or worst.depth <= DEEP:
             return ()
         share = 100.0 * float(np.mean(found.depths > DEEP))
-        part = f"{share:.0f} %" if share >= 1.0 else "less than 1 %"
-        told = (
-            f"'{worst.first}' passes through '{worst.second}' at frame "
-            f"{frames[worst.frame * every]:.0f}, by {worst.depth:.1f} of the radius; something "
-            f"overlaps at {part} of the frames."
+        part = f"{share:.0f} %" if share >= 1.0 else phrase("less than 1 %")
+        told = phrase(
+            "'{first}' passes through '{second}' at frame {frame:.0f}, by {depth:.1f} of "
+            "the radius; something overlaps at {part} of the frames.",
+            first=worst.first,
+            second=worst.second,
+            frame=frames[worst.frame * every],
+            depth=worst.depth,
+            part=part,
         )
         return (told,)
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from ...content_cache import ContentCache, content_key
 from ...errors import RigError, SettingsError
+from ...phrases import phrase
 from ...rotations import (
     Floats,
     components_first,
@@ -595,7 +596,12 @@ def _check_disjoint(arms: Sequence[Arm]) -> None:
         for bone in arm.bones:
             if bone in owner:
                 raise RigError(
-                    f"Bone '{bone}' is in two arms, '{owner[bone]}' and '{arm.name}'.",
+                    phrase(
+                        "Bone '{bone}' is in two arms, '{owner}' and '{arm}'.",
+                        bone=bone,
+                        owner=owner[bone],
+                        arm=arm.name,
+                    ),
                     "Remove one of the two from the list.",
                 )
             owner[bone] = arm.name

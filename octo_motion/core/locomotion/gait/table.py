@@ -19,6 +19,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from ...errors import GaitError
+from ...phrases import phrase
 from ...rotations import Floats
 
 ANGLES: Final = ("head", "pitch", "bank")
@@ -317,36 +318,53 @@ def check_gait(table: GaitTable) -> GaitTable:
         GaitError: numbers that are not finite, knots that do not ascend from 0 to 2π, a last
             value that differs from the first, a table that serves not every pair.
     """
-    where = f"Gait '{table.name}'"
+    where = phrase("Gait '{table}'", table=table.name)
     if 0 not in table.curves:
-        raise GaitError(f"{where} has no curve for all arms.", "Give it a curve for pair 0.")
+        raise GaitError(
+            phrase("{where} has no curve for all arms.", where=where), "Give it a curve for pair 0."
+        )
     scalars = (
         *(table.spread_pairs, table.spread_sides, table.spread_halves),
         *(table.stride, table.power_phase),
         *table.offsets.values(),
     )
     if not np.isfinite(scalars).all():
-        raise GaitError(f"{where} has a number that is not finite.", "Correct it.")
+        raise GaitError(
+            phrase("{where} has a number that is not finite.", where=where), "Correct it."
+        )
     if table.stride <= 0.0:
-        raise GaitError(f"{where} has a stride of {table.stride:g}.", "It must be above zero.")
+        raise GaitError(
+            phrase("{where} has a stride of {stride:g}.", where=where, stride=table.stride),
+            "It must be above zero.",
+        )
     for pair, curve in table.curves.items():
-        place = f"{where}, pair {pair}" if pair else where
+        place = phrase("{where}, pair {pair}", where=where, pair=pair) if pair else where
         if not (np.isfinite(curve.phases).all() and np.isfinite(curve.angles).all()):
-            raise GaitError(f"{place} has a number that is not finite.", "Correct it.")
+            raise GaitError(
+                phrase("{place} has a number that is not finite.", place=place), "Correct it."
+            )
         if curve.angles.shape != (len(curve.phases), LINKS, len(ANGLES)):
             raise GaitError(
-                f"{place} does not have three angles of three links at every knot.",
+                phrase(
+                    "{place} does not have three angles of three links at every knot.", place=place
+                ),
                 "Complete it.",
             )
         if len(curve.phases) < 2 or abs(curve.phases[0]) > 1e-9:
-            raise GaitError(f"{place} does not start at phase 0.", "Add a knot there.")
+            raise GaitError(
+                phrase("{place} does not start at phase 0.", place=place), "Add a knot there."
+            )
         if abs(curve.phases[-1] - CYCLE) > 1e-9:
-            raise GaitError(f"{place} does not end at phase 360°.", "Add a knot there.")
+            raise GaitError(
+                phrase("{place} does not end at phase 360°.", place=place), "Add a knot there."
+            )
         if np.any(np.diff(curve.phases) <= 0.0):
-            raise GaitError(f"{place} has knots that do not ascend.", "Sort them by phase.")
+            raise GaitError(
+                phrase("{place} has knots that do not ascend.", place=place), "Sort them by phase."
+            )
         if np.max(np.abs(curve.angles[0] - curve.angles[-1])) > 1e-9:
             raise GaitError(
-                f"{place} ends at other angles than it starts with.",
+                phrase("{place} ends at other angles than it starts with.", place=place),
                 "Make the values at 0° and 360° equal.",
             )
     return table
@@ -394,7 +412,7 @@ def _rounded(values: Any) -> list[float]:
     return [float(f"{value:.12g}") for value in values]
 
 
-def gait_from_json(text: str, source: str = "The gait file") -> GaitTable:
+def gait_from_json(text: str, source: str = phrase("The gait file")) -> GaitTable:
     """The table in a text made by ``gait_to_json`` or by hand.
 
     The source is what error messages call it, such as the file's name.
@@ -434,10 +452,19 @@ def gait_from_json(text: str, source: str = "The gait file") -> GaitTable:
         )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise GaitError(
-            f"{source} is damaged ({type(error).__name__}: {error}).", "Save the gait anew."
+            phrase(
+                "{source} is damaged ({name}: {error}).",
+                source=source,
+                name=type(error).__name__,
+                error=error,
+            ),
+            "Save the gait anew.",
         ) from error
     if manner not in MANNERS:
-        raise GaitError(f"{source} has the manner {manner!r}.", "It must be walk, crawl or swim.")
+        raise GaitError(
+            phrase("{source} has the manner {manner!r}.", source=source, manner=manner),
+            "It must be walk, crawl or swim.",
+        )
     return check_gait(table)
 
 
@@ -447,16 +474,32 @@ def _content(text: str, source: str) -> dict[str, Any]:
         content = json.loads(text)
     except json.JSONDecodeError as error:
         raise GaitError(
-            f"{source} is not JSON (line {error.lineno}: {error.msg}).", "Choose a gait file."
+            phrase(
+                "{source} is not JSON (line {lineno}: {msg}).",
+                source=source,
+                lineno=error.lineno,
+                msg=error.msg,
+            ),
+            "Choose a gait file.",
         ) from error
     except (ValueError, RecursionError) as error:
         # A number of thousands of digits, or brackets in brackets without end.
-        raise GaitError(f"{source} is not JSON ({error}).", "Choose a gait file.") from error
+        raise GaitError(
+            phrase("{source} is not JSON ({error}).", source=source, error=error),
+            "Choose a gait file.",
+        ) from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise GaitError(f"{source} is not a gait of Octo Motion.", "Choose a gait file.")
+        raise GaitError(
+            phrase("{source} is not a gait of Octo Motion.", source=source), "Choose a gait file."
+        )
     if content.get("version") != FORMAT_VERSION:
         raise GaitError(
-            f"{source} has format version {content.get('version')!r}, not {FORMAT_VERSION}.",
+            phrase(
+                "{source} has format version {version!r}, not {known}.",
+                source=source,
+                version=content.get("version"),
+                known=FORMAT_VERSION,
+            ),
             "Update Octo Motion, or save the gait anew.",
         )
     return content

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SettingsError
+from ...phrases import phrase
 from ...rotations import Floats, normalized, rotate_in_plane
 
 _FREE: Final = np.linspace(0.4, 1.0, 6)
@@ -138,7 +139,11 @@ class CrawlSettings:
             raise SettingsError("A setting of the crawl is not a number above 0.", "Set it anew.")
         if self.near >= self.far:
             raise SettingsError(
-                f"Arms take hold {self.near:g} arm lengths away and let go at {self.far:g}.",
+                phrase(
+                    "Arms take hold {near:g} arm lengths away and let go at {far:g}.",
+                    near=self.near,
+                    far=self.far,
+                ),
                 "Let them take hold nearer than they let go.",
             )
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...content_cache import ContentCache, content_key, part_of
 from ...errors import GroundError
+from ...phrases import phrase
 from ...rotations import Floats
 from ...settings import check_settings, setting, share_setting
 
@@ -224,9 +225,9 @@ def sample_ground(
     inside = np.flatnonzero(needed)
     missing = ~np.isfinite(heights[_nearest(grid, path[inside])])
     if np.any(missing):
-        share = float(np.flatnonzero(missing)[0]) / max(len(inside) - 1, 1)
+        share = 100.0 * float(np.flatnonzero(missing)[0]) / max(len(inside) - 1, 1)
         raise GroundError(
-            f"The route leaves the ground after {100.0 * share:.0f} % of its length.",
+            phrase("The route leaves the ground after {share:.0f} % of its length.", share=share),
             "Move the route, or make the ground larger.",
         )
     if bare is not None:

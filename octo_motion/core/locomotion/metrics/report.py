@@ -15,6 +15,7 @@ from typing import Final
 
 import numpy as np
 
+from ...phrases import joined_phrases, phrase
 from ...rotations import Floats, angle_between, conjugate, from_matrix, multiply, rotate
 from ..clearance import DEEP, Separation
 from ..ground import Ground
@@ -252,16 +253,24 @@ def warnings_for_figures(found: Sequence[Figure]) -> tuple[str, ...]:
     whole = {each: each.value <= _BREAKS.get(each.kind, np.inf) for each in beyond}
     beyond.sort(key=lambda each: (whole[each], TOLD[each.kind] / each.value))
     broken = not whole[beyond[0]]
-    told = "; ".join(
-        _SAID[each.kind].format(
-            arm=each.arm,
-            percent=100.0 * each.value,
-            degrees=np.degrees(each.value),
-            frame=each.frame,
-        )
-        for each in beyond
+    told = joined_phrases(
+        "; ",
+        (
+            phrase(
+                _SAID[each.kind],
+                arm=each.arm,
+                percent=100.0 * each.value,
+                degrees=np.degrees(each.value),
+                frame=each.frame,
+            )
+            for each in beyond
+        ),
     )
-    return (f"The motion breaks: {told}." if broken else f"One sees that {told}.",)
+    return (
+        phrase("The motion breaks: {told}.", told=told)
+        if broken
+        else phrase("One sees that {told}.", told=told),
+    )
 
 
 # --- Arms as they are played ----------------------------------------------------------------------

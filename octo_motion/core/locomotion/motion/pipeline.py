@@ -14,6 +14,7 @@ from typing import Final, TypeVar
 import numpy as np
 
 from ...keyframes import Channel
+from ...phrases import phrase
 from ...rotations import IDENTITY, Floats, from_matrix, rotate, slerp
 from ..clearance import (
     ArmsOverGround,
@@ -495,20 +496,33 @@ def warnings_for_misses(plan: MotionPlan, arms: ArmMotion) -> Iterator[str]:
         frame, arm = np.unravel_index(late.argmax(), late.shape)
         # Bones that may not get longer do not, whatever Stretch is.
         longer = any(each.stretching for each in plan.standing)
-        remedy = "raise Stretch" if longer else "lower Height"
-        first = "Drag its marker nearer" if _dragged(plan.job, int(arm)) else "Lower Hold"
+        remedy = phrase("raise Stretch") if longer else phrase("lower Height")
+        dragged = _dragged(plan.job, int(arm))
+        first = phrase("Drag its marker nearer") if dragged else phrase("Lower Hold")
         yield (
-            f"'{names[arm]}' slides at frame {plan.schedule.frames[frame]:.0f}: its contact is "
-            f"{late[frame, arm]:.2g} arm lengths out of reach. {first}, {remedy} or shorten the "
-            "stride."
+            phrase(
+                "'{name}' slides at frame {frame:.0f}: its contact is {far:.2g} arm lengths out "
+                "of reach. {first}, {remedy} or shorten the stride.",
+                name=names[arm],
+                frame=plan.schedule.frames[frame],
+                far=late[frame, arm],
+                first=first,
+                remedy=remedy,
+            )
         )
         return
     misses = arms.misses.max(axis=0)
     worst = int(misses.argmax())
     if misses[worst] > MISS:
         yield (
-            f"{int((misses > MISS).sum())} of {len(names)} arms cannot follow the gait "
-            f"everywhere: '{names[worst]}' stays {misses[worst]:.2g} arm lengths away."
+            phrase(
+                "{some} of {count} arms cannot follow the gait everywhere: '{name}' stays "
+                "{far:.2g} arm lengths away.",
+                some=int((misses > MISS).sum()),
+                count=len(names),
+                name=names[worst],
+                far=misses[worst],
+            )
         )
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from ...content_cache import ContentCache, content_key
 from ...errors import SettingsError
 from ...keyframes import Channel
+from ...phrases import phrase
 from ...rotations import Floats
 from ...skeleton import Skeleton
 from ..gait import CYCLE, Arm, GaitPoser, target_places
@@ -106,19 +107,24 @@ def too_few_frames(timing: Timing, pace: Pace) -> list[str]:
     if timing.kind == "RANGE":
         length = (timing.end - timing.start) * longer
         end = timing.start + math.ceil(length - 1e-6)
-        remedy = f"Let it end at frame {end:,} or later"
+        remedy = phrase("Let it end at frame {end:,} or later", end=end)
     elif timing.kind == "SPEED":
         slowest = math.floor(1e3 * timing.speed / longer) / 1e3
-        remedy = f"Lower Speed to {slowest:g} m/s"
+        remedy = phrase("Lower Speed to {slowest:g} m/s", slowest=slowest)
     else:
         cycle = math.ceil(1e2 * timing.cycle_time * longer) / 1e2
-        remedy = f"Raise Cycle to {cycle:g} s"
+        remedy = phrase("Raise Cycle to {cycle:g} s", cycle=cycle)
     had = math.floor(10.0 * swing) / 10.0
     return [
         (
-            f"At full speed an arm has {had:g} frames for a swing and jumps from pose to pose: "
-            f"{pace.fastest / timing.rate:.2g} s a cycle are too short. {remedy}, or give the gait "
-            "a longer stride."
+            phrase(
+                "At full speed an arm has {frames:g} frames for a swing and jumps from pose to "
+                "pose: {cycle:.2g} s a cycle are too short. {remedy}, or give the gait a longer "
+                "stride.",
+                frames=had,
+                cycle=pace.fastest / timing.rate,
+                remedy=remedy,
+            )
         )
     ]
 
@@ -399,7 +405,11 @@ def _timing(job: MotionJob, route: Route, travel: TravelSettings) -> tuple[float
         length = timing.end - start
         if length < 1:
             raise SettingsError(
-                f"The motion ends at frame {timing.end} and starts at {start}.",
+                phrase(
+                    "The motion ends at frame {end} and starts at {start}.",
+                    end=timing.end,
+                    start=start,
+                ),
                 "Let it end after its start.",
             )
         exact = float(length)
@@ -414,7 +424,11 @@ def _timing(job: MotionJob, route: Route, travel: TravelSettings) -> tuple[float
         exact = whole_frames(exact)
     if exact > MOST_FRAMES:
         raise SettingsError(
-            f"The motion would take {exact:,.0f} frames, more than {MOST_FRAMES:,}.",
+            phrase(
+                "The motion would take {exact:,.0f} frames, more than {most_frames:,}.",
+                exact=exact,
+                most_frames=MOST_FRAMES,
+            ),
             "Shorten the route, or make the body faster.",
         )
     # The motion is the same at any frame rate: it ends when it ends, and the frame after that
@@ -422,12 +436,17 @@ def _timing(job: MotionJob, route: Route, travel: TravelSettings) -> tuple[float
     count = max(math.ceil(exact - 1e-4), 1) + 1
     if start < -LAST_FRAME:
         raise SettingsError(
-            f"The motion would start at frame {start:,}, before Blender's first.",
+            phrase(
+                "The motion would start at frame {start:,}, before Blender's first.", start=start
+            ),
             "Let it start later.",
         )
     if start + count - 1 > LAST_FRAME:
         raise SettingsError(
-            f"The motion would end at frame {start + count - 1:,}, after Blender's last.",
+            phrase(
+                "The motion would end at frame {end:,}, after Blender's last.",
+                end=start + count - 1,
+            ),
             "Let it start earlier.",
         )
     steps = np.arange(count, dtype=np.float64)

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from ...errors import SettingsError
+from ...phrases import as_phrase, phrase
 from ...rotations import Floats
 from ..gait import diameters
 
@@ -54,7 +55,10 @@ class OctopusShape:
         shortest = float(np.min(self.segments))
         if shortest < _SHORTEST_BONE:
             raise SettingsError(
-                f"The last bones of an arm would be only {shortest:.1g} m long.",
+                phrase(
+                    "The last bones of an arm would be only {shortest:.1g} m long.",
+                    shortest=shortest,
+                ),
                 "Choose longer arms, fewer joints or less taper.",
             )
 
@@ -106,16 +110,22 @@ class OctopusShape:
         return self.first_diameter * np.maximum(by_joints * (1.0 - self.mesh_taper * along), 0.02)
 
 
-def _check_range(name: str, value: float, lowest: float, highest: float) -> None:
+def _check_range(label: str, value: float, lowest: float, highest: float) -> None:
     if not lowest <= value <= highest:
         raise SettingsError(
-            f"{name} is {value:g}.", f"Choose a value from {lowest:g} to {highest:g}."
+            phrase("{label} is {value:g}.", label=as_phrase(label), value=value),
+            phrase(
+                "Choose a value from {lowest:g} to {highest:g}.", lowest=lowest, highest=highest
+            ),
         )
 
 
-def _check_size(name: str, value: float) -> None:
+def _check_size(label: str, value: float) -> None:
     if not (value > 0.0 and math.isfinite(value)):
-        raise SettingsError(f"{name} is {value:g}.", "Choose a length greater than zero.")
+        raise SettingsError(
+            phrase("{label} is {value:g}.", label=as_phrase(label), value=value),
+            "Choose a length greater than zero.",
+        )
 
 
 # --- The form of head and mantle, and the landmarks on them that both bones and skin need ---------

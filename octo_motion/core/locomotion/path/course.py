@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import SettingsError
+from ...phrases import phrase
 from ...rotations import Floats, rotation_vector_between, slerp_in_sense
 from ...smoothing import least_jerk
 from ..gait import CYCLE
@@ -181,7 +182,9 @@ def route_in_place(stride: float, cycles: int) -> Route:
         SettingsError: there is not one whole cycle.
     """
     if cycles < 1:
-        raise SettingsError(f"The loop has {cycles} cycles.", "Give at least 1.")
+        raise SettingsError(
+            phrase("The loop has {cycles} cycles.", cycles=cycles), "Give at least 1."
+        )
     return Route.poly([[0.0, 0.0, 0.0], [0.0, -stride * cycles, 0.0]])
 
 
@@ -207,7 +210,9 @@ def breathing_scales(times: Floats, amount: float, *, breath: float, whole: floa
         SettingsError: a breath takes no time.
     """
     if not breath > 0.0:
-        raise SettingsError(f"A breath takes {breath:g} seconds.", "Give more than 0.")
+        raise SettingsError(
+            phrase("A breath takes {breath:g} seconds.", breath=breath), "Give more than 0."
+        )
     if whole is not None:
         breath = whole / max(round(whole / breath), 1)
     share = np.mod(times / breath, 1.0)

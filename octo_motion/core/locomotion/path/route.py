@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import RouteError
+from ...phrases import phrase
 from ...rotations import Floats, normalized
 
 
@@ -163,7 +164,11 @@ class Route:
         values = np.asarray(knots, dtype=np.float64)
         if not 2 <= order <= len(places):
             raise RouteError(
-                f"The NURBS route of order {order} has {len(places)} points.",
+                phrase(
+                    "The NURBS route of order {order} has {count} points.",
+                    order=order,
+                    count=len(places),
+                ),
                 "Lower the order, or add points.",
             )
         if sizes.shape != (len(places),) or not np.all(sizes > 0.0):
@@ -409,7 +414,8 @@ def _points(points: ArrayLike) -> Floats:
     array = np.asarray(points, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != 3 or len(array) < 2:
         count = len(array) if array.ndim == 2 else 0
-        raise RouteError(f"The route has {count or 'no'} point{'s' * (count != 1)}.", _NOWHERE)
+        points = phrase("1 point") if count == 1 else phrase("{count} points", count=count)
+        raise RouteError(phrase("The route has {points}.", points=points), _NOWHERE)
     _check_numbers(array)
     return array
 

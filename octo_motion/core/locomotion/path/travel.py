@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ...content_cache import ContentCache, content_key, part_of
 from ...errors import SettingsError
+from ...phrases import phrase
 from ...rotations import (
     IDENTITY,
     Floats,
@@ -432,12 +433,16 @@ class TravelSettings:
         check_settings(self)
         if self.stride <= 0.0:
             raise SettingsError(
-                f"The stride is {self.stride:g} m.", "Give a stride longer than nothing."
+                phrase("The stride is {stride:g} m.", stride=self.stride),
+                "Give a stride longer than nothing.",
             )
         if self.ease_in + self.ease_out > 1.0 + 1e-9:
             raise SettingsError(
-                f"Ease in ({self.ease_in:g}) and ease out ({self.ease_out:g}) do not fit into the "
-                "time.",
+                phrase(
+                    "Ease in ({ease_in:g}) and ease out ({ease_out:g}) do not fit into the time.",
+                    ease_in=self.ease_in,
+                    ease_out=self.ease_out,
+                ),
                 "Give shares of the time that make 1 at most together.",
             )
 
@@ -541,7 +546,8 @@ def duration(route: Route, settings: TravelSettings, metres_per_second: float) -
     """
     if not metres_per_second > 0.0:
         raise SettingsError(
-            f"The speed is {metres_per_second:g} m/s.", "Give a speed greater than zero."
+            phrase("The speed is {metres_per_second:g} m/s.", metres_per_second=metres_per_second),
+            "Give a speed greater than zero.",
         )
     return route.length / (metres_per_second * _mean_speed(settings))
 

@@ -18,6 +18,7 @@ from typing import Final, Literal
 import numpy as np
 
 from ...errors import RigError, SettingsError
+from ...phrases import phrase
 from ...rotations import (
     Floats,
     conjugate,
@@ -123,7 +124,7 @@ class Target:
     profile: Profile
     """In its own frame, armature units."""
     places: Places
-    name: str = "The object"
+    name: str = phrase("The object")
     """What errors call it."""
 
 
@@ -314,7 +315,7 @@ def plan_grasp(
     mode: Mode = "COIL",
     turns: float = 2.0,
     up: Floats = _UP,
-    name: str = "The arm",
+    name: str = phrase("The arm"),
 ) -> Grasp:
     """Decide which stretch of the arm takes hold, and where.
 
@@ -337,8 +338,15 @@ def plan_grasp(
     held = (times >= timeline.contact - 1e-6) & (times <= timeline.release + 1e-6)
     if not np.any(held):
         raise SettingsError(
-            f"{name} would touch {target.name} at frame {timeline.contact:g}, outside of the "
-            f"motion, which lasts from frame {times[0]:g} to {times[-1]:g}.",
+            phrase(
+                "{name} would touch {target} at frame {contact:g}, outside of the motion, which "
+                "lasts from frame {first:g} to {last:g}.",
+                name=name,
+                target=target.name,
+                contact=timeline.contact,
+                first=times[0],
+                last=times[-1],
+            ),
             "Change the frames of the reach, or make the motion longer.",
         )
     profile, places = target.profile, target.places
@@ -422,8 +430,14 @@ def _too_far(
     far = np.min(np.linalg.norm(ways, axis=-1), axis=-1) / arm.length
     at = int(np.argmax(far))
     return SettingsError(
-        f"{target.name} is out of reach of {name} at frame {times[at]:g}: it is {far[at]:.2f} "
-        "arm lengths away, and some of the arm has to lie on it.",
+        phrase(
+            "{target} is out of reach of {name} at frame {frame:g}: it is {far:.2f} arm lengths "
+            "away, and some of the arm has to lie on it.",
+            target=target.name,
+            name=name,
+            frame=times[at],
+            far=far[at],
+        ),
         "Move it nearer, or change the frames of the reach.",
     )
 
@@ -669,12 +683,17 @@ class Reaching:
                 return number
         if reach.arm:
             raise RigError(
-                f"The reach '{reach.name}' has no arm '{reach.arm}' that moves.",
+                phrase(
+                    "The reach '{reach}' has no arm '{arm}' that moves.",
+                    reach=reach.name,
+                    arm=reach.arm,
+                ),
                 "Choose an arm of the list that is switched on.",
             )
         if reach.profile is None:
             raise SettingsError(
-                f"It is not said which arm curls in '{reach.name}'.", "Choose its arm."
+                phrase("It is not said which arm curls in '{reach}'.", reach=reach.name),
+                "Choose its arm.",
             )
         at = int(np.argmin(np.abs(times - reach.timeline.contact)))
         goal = places.seen(reach.profile.center)[at]
@@ -743,8 +762,12 @@ class _Work:
             self.held[number][:, grasp.coil.first :] += progress.holds[:, None]
             if reach.mode != "TOUCH":
                 self.notes.append(
-                    f"'{reaching.arms[number].name}' winds {grasp.turns:.1f} times round "
-                    f"'{reach.target}'."
+                    phrase(
+                        "'{arm}' winds {turns:.1f} times round '{target}'.",
+                        arm=reaching.arms[number].name,
+                        turns=grasp.turns,
+                        target=reach.target,
+                    )
                 )
         self.rotations[:, columns] = moved
         self._leaves(reach, number, progress)
@@ -793,8 +816,12 @@ class _Work:
                 continue
             if reach.target in self.ways:
                 raise SettingsError(
-                    f"Both '{self.ways[reach.target].name}' and '{reach.name}' carry "
-                    f"'{reach.target}'.",
+                    phrase(
+                        "Both '{first}' and '{second}' carry '{target}'.",
+                        first=self.ways[reach.target].name,
+                        second=reach.name,
+                        target=reach.target,
+                    ),
                     "Let one of them carry it; the other arm may hold it as well.",
                 )
             seen = travelling.seen(reach.positions, reach.rotations)
@@ -829,7 +856,14 @@ def _taken(busy: Sequence[tuple[int, Reach]], number: int, reach: Reach) -> Reac
 def _check_free(busy: Sequence[tuple[int, Reach]], number: int, reach: Reach, arm: str) -> None:
     if (before := _taken(busy, number, reach)) is not None:
         raise SettingsError(
-            f"'{arm}' reaches in '{before.name}' until frame {before.timeline.end:g} and in "
-            f"'{reach.name}' from frame {reach.timeline.start:g}.",
+            phrase(
+                "'{arm}' reaches in '{before}' until frame {end:g} and in '{reach}' from frame "
+                "{start:g}.",
+                arm=arm,
+                before=before.name,
+                end=before.timeline.end,
+                reach=reach.name,
+                start=reach.timeline.start,
+            ),
             "Let one end before the other starts, or choose another arm.",
         )

@@ -24,6 +24,7 @@ from typing import Final
 import numpy as np
 
 from ...errors import SettingsError
+from ...phrases import phrase
 from ...rotations import (
     Floats,
     angle_between,
@@ -101,9 +102,15 @@ class Timeline:
             raise SettingsError("A time of the reach is not a number.", "Set it anew.")
         if not self.start < self.contact <= self.closed <= self.release < self.end:
             raise SettingsError(
-                f"A reach that starts at frame {self.start:g}, touches at {self.contact:g}, holds "
-                f"from {self.closed:g} to {self.release:g} and ends at {self.end:g} is out of "
-                "order.",
+                phrase(
+                    "A reach that starts at frame {start:g}, touches at {contact:g}, holds from "
+                    "{closed:g} to {release:g} and ends at {end:g} is out of order.",
+                    start=self.start,
+                    contact=self.contact,
+                    closed=self.closed,
+                    release=self.release,
+                    end=self.end,
+                ),
                 "Let each come after the one before.",
             )
 

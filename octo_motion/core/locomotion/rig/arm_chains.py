@@ -16,6 +16,7 @@ from typing import Final, Literal
 import numpy as np
 
 from ...errors import RigError
+from ...phrases import phrase
 from ...rotations import Floats, normalized
 from ...skeleton import Skeleton
 
@@ -102,7 +103,7 @@ def body_rotation(up: str, front: str) -> Floats:
     left = np.cross(up_axis, front_axis)
     if not np.any(left):
         raise RigError(
-            f"The body's front ({front}) and up ({up}) lie on one axis.",
+            phrase("The body's front ({front}) and up ({up}) lie on one axis.", front=front, up=up),
             "Choose a front axis across the up axis.",
         )
     return np.stack([left, -front_axis, up_axis], axis=1)
@@ -132,24 +133,36 @@ def chain_of(skeleton: Skeleton, names: Iterable[str]) -> tuple[str, ...]:
     for upper, lower in pairwise(order):
         if depth[upper] == depth[lower]:
             raise RigError(
-                f"'{skeleton.names[upper]}' and '{skeleton.names[lower]}' are not in one chain.",
+                phrase(
+                    "'{upper}' and '{lower}' are not in one chain.",
+                    upper=skeleton.names[upper],
+                    lower=skeleton.names[lower],
+                ),
                 "Choose the bones of a single arm, from its root to its tip.",
             )
     if len(order) < LEAST_BONES:
         raise RigError(
-            f"An arm needs at least {LEAST_BONES} bones in a row, not {len(order)}.",
+            phrase(
+                "An arm needs at least {least_bones} bones in a row, not {count}.",
+                least_bones=LEAST_BONES,
+                count=len(order),
+            ),
             "Choose all bones of the arm, or subdivide them.",
         )
     if len(order) > MOST_BONES:
         raise RigError(
-            f"An arm can have {MOST_BONES} bones at most, not {len(order)}.",
+            phrase(
+                "An arm can have {most_bones} bones at most, not {count}.",
+                most_bones=MOST_BONES,
+                count=len(order),
+            ),
             "Choose fewer of its bones.",
         )
     segments = np.linalg.norm(np.diff(skeleton.heads[order], axis=0), axis=1)
     for number in np.flatnonzero(segments <= COINCIDENT * segments.sum()):
         upper, lower = (skeleton.names[order[number + step]] for step in (0, 1))
         raise RigError(
-            f"'{upper}' and '{lower}' start at the same point.",
+            phrase("'{upper}' and '{lower}' start at the same point.", upper=upper, lower=lower),
             "Leave out the one that is a helper.",
         )
     return tuple(skeleton.names[bone] for bone in order)
@@ -248,7 +261,7 @@ def place_added(
     for bone in bones:
         if bone in taken:
             raise RigError(
-                f"'{bone}' belongs to another arm of the list.",
+                phrase("'{bone}' belongs to another arm of the list.", bone=bone),
                 "Remove that arm from the list first, or select other bones.",
             )
     arranged = arrange(skeleton, [bones, *(arm for arm, _, _ in others)], body)
@@ -397,5 +410,7 @@ def _mates_by_shape(
 def _bone_index(skeleton: Skeleton, name: str) -> int:
     bone = skeleton.index.get(name)
     if bone is None:
-        raise RigError(f"The armature has no bone '{name}'.", "Detect the arms again.")
+        raise RigError(
+            phrase("The armature has no bone '{name}'.", name=name), "Detect the arms again."
+        )
     return bone

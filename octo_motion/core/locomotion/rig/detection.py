@@ -19,6 +19,7 @@ from typing import Final
 import numpy as np
 
 from ...errors import RigError
+from ...phrases import phrase
 from ...rotations import Floats, normalized
 from ...skeleton import Skeleton
 from .arm_chains import (
@@ -97,11 +98,18 @@ def candidate_chains(skeleton: Skeleton) -> tuple[BoneTree, list[BoneChain]]:
         longest = max([longest, *map(len, chains)])
     if longest > MOST_BONES:
         raise RigError(
-            f"No arms were found: the chain of {longest} bones has more than {MOST_BONES}.",
+            phrase(
+                "No arms were found: the chain of {longest} bones has more than {most_bones}.",
+                longest=longest,
+                most_bones=MOST_BONES,
+            ),
             REMEDY,
         )
     raise RigError(
-        f"No arms were found: no {LEAST_BONES} bones form a chain with a free tip.",
+        phrase(
+            "No arms were found: no {least_bones} bones form a chain with a free tip.",
+            least_bones=LEAST_BONES,
+        ),
         "An arm needs at least three bones in a row; subdivide its bones, or select another "
         "armature.",
     )
@@ -498,7 +506,14 @@ def detect_arms(
     tree, chains = candidate_chains(skeleton)
     family = best_family(skeleton, tree, chains, up)
     if len(family) > MOST_ARMS:
-        raise RigError(f"{len(family)} chains could be arms, and {MOST_ARMS} is the most.", REMEDY)
+        raise RigError(
+            phrase(
+                "{count} chains could be arms, and {most_arms} is the most.",
+                count=len(family),
+                most_arms=MOST_ARMS,
+            ),
+            REMEDY,
+        )
     deforming = [tuple(skeleton.names[bone] for bone in chain.bones) for chain in family]
     arms, notes = _keyable(skeleton, deforming)
     if front is None:
@@ -597,24 +612,35 @@ def _keyable(
     if exchanged:
         example = next(bones[0] for bones in arms if bones not in deforming)
         notes.append(
-            f"Constraints move the bones that deform {_arms(exchanged)}: the list has the control "
-            f"bones at the same joints ('{example}' …)."
+            phrase(
+                "Constraints move the bones that deform {arms}: the list has the control bones "
+                "at the same joints ('{example}' …).",
+                arms=_arms(exchanged),
+                example=example,
+            )
         )
     if further:
         notes.append(
-            f"{len(further)} of these have constraints of their own ('{min(further)}' …): mute "
-            "those if the arms bend more than they should."
+            phrase(
+                "{count} of these have constraints of their own ('{example}' …): mute those if "
+                "the arms bend more than they should.",
+                count=len(further),
+                example=min(further),
+            )
         )
     if held:
         notes.append(
-            f"Constraints or drivers move {_arms(held)}, and no control bones were found: keys "
-            "have no effect while the constraints are on."
+            phrase(
+                "Constraints or drivers move {arms}, and no control bones were found: keys have "
+                "no effect while the constraints are on.",
+                arms=_arms(held),
+            )
         )
     return arms, notes
 
 
 def _arms(number: int) -> str:
-    return "1 arm" if number == 1 else f"{number} arms"
+    return phrase("1 arm") if number == 1 else phrase("{number} arms", number=number)
 
 
 def _facing(
@@ -636,7 +662,13 @@ def _facing(
         axis = nearest_axis(rotation[:, :2] @ left, across=up)
         # What lies to the left of the front: front = left × up.
         front = nearest_axis(np.cross(np.array(AXES[axis], float), np.array(AXES[up], float)))
-        return front, [f"The bones named left lie towards {axis}: Front was set to {front}."]
+        return front, [
+            phrase(
+                "The bones named left lie towards {axis}: Front was set to {front}.",
+                axis=axis,
+                front=front,
+            )
+        ]
 
     if len(arms) > 2:
         across = mirror_distances(shapes, axis=0).min(axis=1).mean()
@@ -646,9 +678,11 @@ def _facing(
             ahead = 1.0 if places[:, 0].mean() >= 0.0 else -1.0
             front = nearest_axis(ahead * rotation[:, 0])
             axis = front.removeprefix("-")
-            reason = (
-                f"The arms mirror each other across {axis}: Front was set to {front}. "
-                "Change it and detect again if the body faces the other way."
+            reason = phrase(
+                "The arms mirror each other across {axis}: Front was set to {front}. Change "
+                "it and detect again if the body faces the other way.",
+                axis=axis,
+                front=front,
             )
             return front, [reason]
     return usual, []
@@ -662,9 +696,10 @@ def _unclear_directions(
     upright = int(np.sum(np.linalg.norm(shapes[..., :2], axis=-1).max(axis=1) < _UPRIGHT))
     if not upright or len(arms) == 1:
         return []
-    verb = "stands" if upright == 1 else "stand"
-    note = (
-        f"{_arms(upright).capitalize()} {verb} upright in the middle of the body: sides and pairs "
-        "cannot be told from the rest pose; set them by hand."
+    who = phrase("1 arm stands") if upright == 1 else phrase("{number} arms stand", number=upright)
+    note = phrase(
+        "{who} upright in the middle of the body: sides and pairs cannot be told from the rest "
+        "pose; set them by hand.",
+        who=who,
     )
     return [note]

@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 
 from ...errors import RigError
+from ...phrases import phrase
 from ...rotations import Floats
 from ...skeleton import Skeleton
 from .figure import distances_to_axes
@@ -103,7 +104,7 @@ def find_roles(skeleton: Skeleton, facts: RigFacts, name: str = "The armature") 
     """
     size = diagonal(skeleton.heads, skeleton.tails)
     if not size > 0.0:
-        raise RigError(f"'{name}' has no size.", "Repair its bones or its scale.")
+        raise RigError(phrase("'{name}' has no size.", name=name), "Repair its bones or its scale.")
     # A rig in which all bones bear names of helpers means something else by them.
     chosen, driven = _chosen(skeleton, facts, size)
     if not chosen:
@@ -111,11 +112,11 @@ def find_roles(skeleton: Skeleton, facts: RigFacts, name: str = "The armature") 
     if not chosen:
         if facts.moved:
             raise RigError(
-                f"Constraints or drivers move all limbs of '{name}'.",
+                phrase("Constraints or drivers move all limbs of '{name}'.", name=name),
                 "Mute them, or bake the motion to keys.",
             )
         raise RigError(
-            f"'{name}' has no bone that could be posed by hand.",
+            phrase("'{name}' has no bone that could be posed by hand.", name=name),
             "Mark bones as limbs in the panel Pose.",
         )
     tree = _tree(skeleton, facts, _joined(skeleton, facts, chosen, size), size)

@@ -21,6 +21,7 @@ from typing import Final
 import numpy as np
 
 from ...errors import SettingsError
+from ...phrases import phrase
 from ...rotations import Floats
 from .figure import Elements, Figure
 
@@ -110,7 +111,8 @@ def elements_for(
     if isinstance(material, str):
         if material not in MATERIALS:
             raise SettingsError(
-                f"There is no material '{material}'.", f"Choose one of {', '.join(MATERIALS)}."
+                phrase("There is no material '{material}'.", material=material),
+                phrase("Choose one of {names}.", names=", ".join(MATERIALS)),
             )
         material = MATERIALS[material]
     if not (np.isfinite(strength) and strength > 0.0):

@@ -18,6 +18,7 @@ from operator import itemgetter
 from typing import Final, NoReturn
 
 from ...errors import ClipError
+from ...phrases import as_phrase, phrase
 
 FASTEST: Final = 2000.0
 """Frames per second that no motion capture exceeds."""
@@ -63,9 +64,10 @@ def check_bvh(content: bytes) -> CheckedBvh:
 
 
 def _refuse(problem: str, line: int | None = None) -> NoReturn:
-    place = "" if line is None else f"Line {line}: "
-    problem = f"{place}{problem}"
-    raise ClipError(f"{problem[0].upper()}{problem[1:]}.", _REMEDY)
+    told = as_phrase(problem)
+    if line is None:
+        raise ClipError(phrase("{problem}.", problem=told.capitalised()), _REMEDY)
+    raise ClipError(phrase("Line {line}: {problem}.", line=line, problem=told), _REMEDY)
 
 
 def _decoded(content: bytes) -> tuple[str, list[str]]:
@@ -76,18 +78,22 @@ def _decoded(content: bytes) -> tuple[str, list[str]]:
             try:
                 text = content[len(mark) :].decode(encoding)
             except UnicodeDecodeError:
-                _refuse(f"it begins like {encoding.upper()} text, but is none")
+                _refuse(
+                    phrase("it begins like {encoding} text, but is none", encoding=encoding.upper())
+                )
             if encoding != "utf-8":
-                notes.append(f"Its text was {encoding.upper()}.")
+                notes.append(phrase("Its text was {encoding}.", encoding=encoding.upper()))
             break
     else:
         text, note = _unmarked(content)
         notes += [note] if note else []
     text = text.replace("\r\n", "\n").replace("\r", "\n").rstrip("\0 \t\n")
     if not text:
-        _refuse("the file is empty")
+        _refuse(phrase("the file is empty"))
     if "\0" in text:
-        _refuse("there are zero bytes in the text", text[: text.index("\0")].count("\n") + 1)
+        _refuse(
+            phrase("there are zero bytes in the text"), text[: text.index("\0")].count("\n") + 1
+        )
     return text, notes
 
 
@@ -98,7 +104,7 @@ def _unmarked(content: bytes) -> tuple[str, str]:
         wide = "utf-16-le" if content[1:2] == b"\0" else "utf-16-be"
         text = _strictly(content, wide)
         if text is not None:
-            return text, f"Its text was {wide.upper()}."
+            return text, phrase("Its text was {wide}.", wide=wide.upper())
     text = _strictly(content, "utf-8")
     if text is not None:
         return text, ""
@@ -106,7 +112,9 @@ def _unmarked(content: bytes) -> tuple[str, str]:
     for encoding, title in (("euc_jp", "EUC-JP"), ("cp932", "Shift-JIS")):
         text = _strictly(content, encoding)
         if text is not None and (encoding == "euc_jp" or _SHIFT_JIS.search(content)):
-            return text, f"Its names are not in UTF-8: they were read as {title}."
+            return text, phrase(
+                "Its names are not in UTF-8: they were read as {title}.", title=title
+            )
     return content.decode("latin-1"), "Its names are not in UTF-8: some letters may look wrong."
 
 
@@ -131,7 +139,7 @@ class _File:
         self.lines = [(number, line) for number, line in lines if line]
         number, first = self.lines[0]
         if first.split()[0].upper() != "HIERARCHY":
-            _refuse("this is not a BVH file: it does not begin with HIERARCHY", number)
+            _refuse(phrase("this is not a BVH file: it does not begin with HIERARCHY"), number)
         self.lines[:1] = [(number, part) for part in first.split(None, 1)]
         self.place = 1
         begun = (place for place, (_, line) in enumerate(self.lines) if _keyword(line) == "MOTION")
@@ -149,12 +157,18 @@ class _File:
         _refuse(problem, self.lines[self.place - 1][0])
 
     def refuse_instead_of(self, expected: str) -> NoReturn:
-        self.refuse(f"'{_short(self.lines[self.place - 1][1])}' stands where {expected} should")
+        self.refuse(
+            phrase(
+                "'{text}' stands where {expected} should",
+                text=_short(self.lines[self.place - 1][1]),
+                expected=expected,
+            )
+        )
 
     def next(self, expected: str) -> str:
         """The next line, or a refusal because the file ends here."""
         if self.at_end:
-            self.refuse(f"the file ends where {expected} should follow")
+            self.refuse(phrase("the file ends where {expected} should follow", expected=expected))
         self.place += 1
         return self.lines[self.place - 1][1]
 
@@ -177,17 +191,17 @@ class _File:
         while not self.at_end and self.lines[self.place][1].upper() != "MOTION":
             line = self.next("ROOT")
             if _keyword(line) != "ROOT":
-                self.refuse_instead_of("ROOT or MOTION")
+                self.refuse_instead_of(phrase("ROOT or MOTION"))
             self._read_root(line)
         if len(self.plain) == 1:
-            self.refuse("there is no ROOT")
+            self.refuse(phrase("there is no ROOT"))
 
     def _read_root(self, line: str) -> None:
         """A root and all below it. Not by recursion: chains may be long."""
         self._open("ROOT", line)
         depth = 1
         while depth:
-            line = self.next("the rest of the hierarchy")
+            line = self.next(phrase("the rest of the hierarchy"))
             word = _keyword(line)
             if word == "}":
                 depth -= 1
@@ -196,19 +210,19 @@ class _File:
                 self._open("JOINT", line)
                 depth += 1
             elif word == "END":
-                self.after("{", "an opening brace")
+                self.after("{", phrase("an opening brace"))
                 self.plain += ["End Site", "{", self._offset(), "}"]
-                self.after("}", "a closing brace")
+                self.after("}", phrase("a closing brace"))
             elif word == "MOTION":
-                self.refuse("MOTION comes before all braces are closed")
+                self.refuse(phrase("MOTION comes before all braces are closed"))
             else:
-                self.refuse(f"'{_short(line)}' is no part of a hierarchy")
+                self.refuse(phrase("'{text}' is no part of a hierarchy", text=_short(line)))
 
     def _open(self, keyword: str, line: str) -> None:
         name = "_".join(line.split()[1:])
         if not name:
-            self.refuse("a joint has no name")
-        self.after("{", "an opening brace")
+            self.refuse(phrase("a joint has no name"))
+        self.after("{", phrase("an opening brace"))
         offset = self._offset()
         channels = self._channels(offset.split()[1:])
         self.plain += [f"{keyword} {name}", "{", offset, channels]
@@ -222,12 +236,16 @@ class _File:
         """
         count, *names = self.after("CHANNELS") or [""]
         if not count.isdigit() or int(count) != len(names):
-            self.refuse(f"CHANNELS does not say how many of them there are: {len(names)}")
+            self.refuse(
+                phrase(
+                    "CHANNELS does not say how many of them there are: {count}", count=len(names)
+                )
+            )
         for name in names:
             if name.lower() not in _CHANNELS:
-                self.refuse(f"'{_short(name)}' is no channel")
+                self.refuse(phrase("'{text}' is no channel", text=_short(name)))
         if len({name.lower() for name in names}) != len(names):
-            self.refuse("a channel is there twice")
+            self.refuse(phrase("a channel is there twice"))
         self.channels += len(names)
         plain = [f"{name[0].upper()}{name[1:].lower()}" for name in names]
         for kind, still in zip(_KINDS, (offset, ["0"] * 3), strict=True):
@@ -240,20 +258,32 @@ class _File:
     def read_motion(self) -> float:
         """All frames; the time of one, seconds."""
         if self.at_end:
-            self.refuse("the file ends after its hierarchy: there is no MOTION")
+            self.refuse(phrase("the file ends after its hierarchy: there is no MOTION"))
         self.next("MOTION")
-        declared = int(self.value(r"frames\s*:?\s*(-?\d+)", "'Frames:' and a number"))
-        word = self.value(r"frame\s*time\s*:?\s*(\S+)", "'Frame Time:' and seconds")
+        declared = int(self.value(r"frames\s*:?\s*(-?\d+)", phrase("'Frames:' and a number")))
+        word = self.value(r"frame\s*time\s*:?\s*(\S+)", phrase("'Frame Time:' and seconds"))
         time = float(self._numbers([word], 1)[0])
         if time <= 0.0:
-            self.refuse(f"the frame time is {word} seconds")
+            self.refuse(phrase("the frame time is {word} seconds", word=word))
         if time * FASTEST < 1.0:
-            self.refuse(f"the frame time of {word} seconds means {1.0 / time:.0f} frames a second")
+            self.refuse(
+                phrase(
+                    "the frame time of {word} seconds means {rate:.0f} frames a second",
+                    word=word,
+                    rate=1.0 / time,
+                )
+            )
         rows = self._rows(declared)
         if not rows:
-            self.refuse("there are no frames")
+            self.refuse(phrase("there are no frames"))
         if declared != len(rows):
-            self.notes.append(f"It says that it has {declared} frames, but has {len(rows)}.")
+            self.notes.append(
+                phrase(
+                    "It says that it has {declared} frames, but has {count}.",
+                    declared=declared,
+                    count=len(rows),
+                )
+            )
         self.plain += ["MOTION", f"Frames: {len(rows)}", f"Frame Time: {time!r}", *rows]
         return time
 
@@ -262,7 +292,7 @@ class _File:
         rows: list[str] = []
         commas = False
         while not self.at_end:
-            line = self.next("a frame")
+            line = self.next(phrase("a frame"))
             words = line.split()
             if len(words) == self.channels and _are_finite(words):
                 rows.append(line)
@@ -274,7 +304,13 @@ class _File:
                 commas = True
             if len(rows) >= declared > 0 and not any(_NUMBER.match(word) for word in words):
                 number, left = self.lines[self.place - 1][0], len(self.lines) - self.place + 1
-                self.notes.append(f"Line {number} and what follows is no motion: {left} left out.")
+                self.notes.append(
+                    phrase(
+                        "Line {number} and what follows is no motion: {left} left out.",
+                        number=number,
+                        left=left,
+                    )
+                )
                 break
             rows.append(" ".join(self._numbers(words, self.channels)))
         if commas:
@@ -297,11 +333,17 @@ class _File:
         for word in plain:
             named = word.lower().lstrip("+-") in {"nan", "inf", "infinity"} or "#" in word
             if not named and not _NUMBER.match(word):
-                self.refuse(f"'{_short(word)}' is no number")
+                self.refuse(phrase("'{text}' is no number", text=_short(word)))
             if named or not math.isfinite(float(word)):
-                self.refuse(f"'{_short(word)}' is not a finite number")
+                self.refuse(phrase("'{text}' is not a finite number", text=_short(word)))
         if len(plain) != count:
-            self.refuse(f"there are {len(plain)} numbers instead of {count}")
+            self.refuse(
+                phrase(
+                    "there are {count} numbers instead of {expected}",
+                    count=len(plain),
+                    expected=count,
+                )
+            )
         return plain
 
 

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from ...errors import ClipError
+from ...phrases import phrase
 from ...rotations import Floats
 
 _STEEPEST: Final = 3.0
@@ -155,8 +156,12 @@ def matched_clock(
     for one, other in pairwise(behind):
         if other.clip <= one.clip or other.base <= one.base:
             raise ClipError(
-                f"The markers '{one.name}' and '{other.name}' do not follow each other in the clip "
-                "as they do in the base.",
+                phrase(
+                    "The markers '{one}' and '{other}' do not follow each other in the clip as "
+                    "they do in the base.",
+                    one=one.name,
+                    other=other.name,
+                ),
                 "Move them, or give one of them a name that the other motion does not have.",
             )
     if not behind:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import ClipError
+from ...phrases import phrase
 from ...rotations import Floats
 from ...smoothing import smooth_step
 from .clip import Clip
@@ -308,7 +309,9 @@ def _check(timing: Timing) -> None:
     if timing.ease_in < 0.0 or timing.ease_out < 0.0:
         raise ClipError("Easing cannot be below zero.", "Enter 0 for a hard cut.")
     if timing.after not in AFTER:
-        raise ClipError(f"'{timing.after}' is no ending.", "Choose hold, loop or stop.")
+        raise ClipError(
+            phrase("'{after}' is no ending.", after=timing.after), "Choose hold, loop or stop."
+        )
 
 
 def moments_within(

@@ -15,6 +15,7 @@ from typing import Final
 
 import numpy as np
 
+from ...phrases import phrase
 from ...rotations import Floats
 from ...skeleton import Skeleton
 from .landmarks import LANDMARKS, OPTIONAL, Landmarks, read_names
@@ -35,7 +36,8 @@ LIMBS: Final = {"arm": ARM, "leg": LEG}
 _CORE: Final = {
     kind: [part for part in parts if part not in OPTIONAL_PARTS] for kind, parts in LIMBS.items()
 }
-_TITLES: Final = {"L": "left", "R": "right"}
+_TITLES: Final = {"L": phrase("left"), "R": phrase("right")}
+_KINDS: Final = {"arm": phrase("arm"), "leg": phrase("leg")}
 
 
 @dataclass(frozen=True)
@@ -113,8 +115,12 @@ def _named_limb(
         missing[f"toe.{side}"] = "The foot has several toes."
     if "hand" in rivals:
         notes.append(
-            f"The {_TITLES[side]} hand has {len(rivals['hand']) + 1} bones: "
-            f"'{body.skeleton.names[limb['hand']]}' was taken."
+            phrase(
+                "The {side} hand has {count} bones: '{bone}' was taken.",
+                side=_TITLES[side],
+                count=len(rivals["hand"]) + 1,
+                bone=body.skeleton.names[limb["hand"]],
+            )
         )
     return limb
 
@@ -148,12 +154,18 @@ def _complete_from_shape(
                 continue
             if any(limb.get(part, bone) != bone for part, bone in known.items()):
                 notes.append(
-                    f"Names and shape of the {_TITLES[side]} {kind} do not agree: look at it."
+                    phrase(
+                        "Names and shape of the {side} {kind} do not agree: look at it.",
+                        side=_TITLES[side],
+                        kind=_KINDS[kind],
+                    )
                 )
                 continue
             known |= {part: bone for part, bone in limb.items() if part not in known}
             notes.append(
-                f"The bones of the {kind}s were told by their lengths, not by names: look at them."
+                "The bones of the arms were told by their lengths, not by names: look at them."
+                if kind == "arm"
+                else "The bones of the legs were told by their lengths, not by names: look at them."
             )
 
 

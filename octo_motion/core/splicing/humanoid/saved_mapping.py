@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from ...errors import RigError
+from ...phrases import phrase
 from .landmarks import LANDMARKS, Landmarks
 
 _FORMAT: Final = "octo_motion.mapping"
@@ -85,7 +86,9 @@ def new_mapping(
     chains: list[list[str]] = []
     for bone in landmarks.bones.values():
         if bone not in parents:
-            raise RigError(f"There is no bone '{bone}'.", "Correct the table of landmarks.")
+            raise RigError(
+                phrase("There is no bone '{bone}'.", bone=bone), "Correct the table of landmarks."
+            )
         chain = [bone]
         while parents[chain[-1]]:
             chain.append(parents[chain[-1]])
@@ -116,20 +119,27 @@ def mapping_from_json(text: str, name: str) -> SavedMapping:
     try:
         content = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise damaged_mapping(name, "it is no JSON") from error
+        raise damaged_mapping(name, phrase("it is no JSON")) from error
     if not isinstance(content, dict) or content.get("format") != _FORMAT:
-        raise damaged_mapping(name, "it is a file of something else")
+        raise damaged_mapping(name, phrase("it is a file of something else"))
     if content.get("version") != _VERSION:
-        raise damaged_mapping(name, f"its version is {content.get('version')}, not {_VERSION}")
+        raise damaged_mapping(
+            name,
+            phrase(
+                "its version is {version}, not {known}",
+                version=content.get("version"),
+                known=_VERSION,
+            ),
+        )
     parents, landmarks = (_names(content, key, name) for key in ("parents", "landmarks"))
     known = {each: bone for each, bone in landmarks.items() if each in LANDMARKS}
     if not known:
-        raise damaged_mapping(name, "it has no landmarks")
+        raise damaged_mapping(name, phrase("it has no landmarks"))
     for bone in (*known.values(), *filter(None, parents.values())):
         if bone not in parents:
-            raise damaged_mapping(name, f"it does not say on what '{bone}' hangs")
+            raise damaged_mapping(name, phrase("it does not say on what '{bone}' hangs", bone=bone))
     if sum(not parent for parent in parents.values()) != 1:
-        raise damaged_mapping(name, "not just one of its bones carries all others")
+        raise damaged_mapping(name, phrase("not just one of its bones carries all others"))
     own = {"format", "version", "name", "parents", "landmarks"}
     further = {key: value for key, value in content.items() if key not in own}
     return SavedMapping(name, parents, known, further)
@@ -145,13 +155,16 @@ def _alike(rows: Sequence[Sequence[str]]) -> int:
 def _names(content: Mapping[str, Any], key: str, name: str) -> dict[str, str]:
     names = content.get(key)
     if not isinstance(names, dict) or not all(isinstance(each, str) for each in names.values()):
-        raise damaged_mapping(name, f"'{key}' is no table of names")
+        raise damaged_mapping(name, phrase("'{key}' is no table of names", key=key))
     return names
 
 
 def damaged_mapping(name: str, reason: str) -> RigError:
     """The error that says so."""
-    return RigError(f"The saved mapping '{name}' cannot be read: {reason}.", _REMEDY)
+    return RigError(
+        phrase("The saved mapping '{name}' cannot be read: {reason}.", name=name, reason=reason),
+        _REMEDY,
+    )
 
 
 def recognised(

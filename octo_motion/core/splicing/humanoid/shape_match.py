@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 
+from ...phrases import phrase
 from ...skeleton import Skeleton
 from .landmarks import BoneName
 
@@ -36,6 +37,7 @@ _FORK: Final = 0.3
 """What it is worth that a limb ends where it forks into fingers."""
 
 _FEWEST_BONES: Final = 15
+_PAIRS: Final = {0: phrase("no pair"), 1: phrase("one pair")}
 """Hips, chest, head, and four limbs of three."""
 
 
@@ -68,7 +70,9 @@ class _Tree:
 def shape_of(skeleton: Skeleton, names: Sequence[BoneName]) -> Shape:
     """Limbs and trunk, or why there are none."""
     if len(skeleton) < _FEWEST_BONES:
-        return Shape(problem=f"This is no humanoid: it has {len(skeleton)} bones.")
+        return Shape(
+            problem=phrase("This is no humanoid: it has {count} bones.", count=len(skeleton))
+        )
     tree = _tree(skeleton, names)
     longest = max(tree.reach, default=0.0)
     forks = {
@@ -90,14 +94,19 @@ def shape_of(skeleton: Skeleton, names: Sequence[BoneName]) -> Shape:
     many = [bone for bone, pairs in forks.items() if _count(tree, pairs) > _MOST_LIMBS]
     if many:
         return Shape(
-            problem=f"This is no humanoid: {_count(tree, forks[many[0]])} limbs of one length "
-            f"start at '{skeleton.names[many[0]]}'."
+            problem=phrase(
+                "This is no humanoid: {count} limbs of one length start at '{name}'.",
+                count=_count(tree, forks[many[0]]),
+                name=skeleton.names[many[0]],
+            )
         )
     if len(forks) != 2:
-        found = "no pair" if not forks else "one pair" if len(forks) == 1 else f"{len(forks)} pairs"
         return Shape(
-            problem=f"This is no humanoid by its shape: it has {found} of limbs that mirror each "
-            "other instead of two."
+            problem=phrase(
+                "This is no humanoid by its shape: it has {found} of limbs that mirror each "
+                "other instead of two.",
+                found=_PAIRS.get(len(forks)) or phrase("{count} pairs", count=len(forks)),
+            )
         )
     lower, upper = sorted(forks, key=lambda bone: len(skeleton.ancestors(bone)))
     legs = _limbs(tree, forks[lower][0], ("thigh", "shin", "foot"))

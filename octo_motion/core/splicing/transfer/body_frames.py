@@ -19,6 +19,7 @@ from typing import Final
 import numpy as np
 
 from ...errors import ClipError
+from ...phrases import phrase
 from ...rotations import Floats, conjugate, from_matrix, multiply, normalized, rotate
 from ...skeleton import Skeleton
 from ..clip import Posture
@@ -194,8 +195,10 @@ def _frame(
     up = up - np.dot(left, up) * left
     if np.linalg.norm(left) < 0.5 or np.linalg.norm(up) < 1e-3:
         raise ClipError(
-            f"Left, right and up cannot be told at '{skeleton.names[bone]}': its joints lie in "
-            "one line.",
+            phrase(
+                "Left, right and up cannot be told at '{name}': its joints lie in one line.",
+                name=skeleton.names[bone],
+            ),
             "Look at the bone table.",
         )
     up = normalized(up)

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from ...errors import ClipError
+from ...phrases import phrase
 from ...rotations import (
     IDENTITY,
     Floats,
@@ -190,7 +191,9 @@ def check_hips(skeleton: Skeleton, hips: int) -> None:
     if skeleton.connected[hips] and skeleton.parents[hips] >= 0:
         name, parent = skeleton.names[hips], skeleton.names[skeleton.parents[hips]]
         raise ClipError(
-            f"'{name}' cannot travel: it is connected to '{parent}'.",
+            phrase(
+                "'{name}' cannot travel: it is connected to '{parent}'.", name=name, parent=parent
+            ),
             "Turn off its Connected (bone properties, Relations), or With Travel.",
         )
 

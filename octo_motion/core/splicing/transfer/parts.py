@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from ...errors import ClipError
+from ...phrases import as_phrase, phrase
 from ...skeleton import Skeleton
 from ..humanoid import Landmarks
 
@@ -158,7 +159,9 @@ def bone_of(skeleton: Skeleton, name: str) -> int:
         ClipError: the skeleton has no such bone.
     """
     if name not in skeleton.index:
-        raise ClipError(f"There is no bone '{name}'.", "Choose the bones of the part again.")
+        raise ClipError(
+            phrase("There is no bone '{name}'.", name=name), "Choose the bones of the part again."
+        )
     return skeleton.index[name]
 
 
@@ -173,7 +176,8 @@ def landmark_bone(skeleton: Skeleton, landmarks: Landmarks, *choices: str) -> in
         if name is not None:
             return bone_of(skeleton, name)
     raise ClipError(
-        f"It is not known which bone is the {_spoken(choices[0])}.", "Say it in the bone table."
+        phrase("It is not known which bone is the {landmark}.", landmark=spoken(choices[0])),
+        "Say it in the bone table.",
     )
 
 
@@ -225,8 +229,12 @@ def kind_bones(
     above = skeleton.ancestors(end)
     if top not in above:
         raise ClipError(
-            f"The {kind.name} cannot be spliced: '{skeleton.names[end]}' does not hang on "
-            f"'{skeleton.names[top]}'.",
+            phrase(
+                "The {kind} cannot be spliced: '{lower}' does not hang on '{upper}'.",
+                kind=as_phrase(kind.name),
+                lower=skeleton.names[end],
+                upper=skeleton.names[top],
+            ),
             "Look at the bone table, or choose another part.",
         )
     path = [*above[: above.index(top)][::-1], end]
@@ -242,7 +250,8 @@ def kind_bones(
     return bones_beneath(skeleton, [next(each for each in path if each not in carriers)])
 
 
-def _spoken(landmark: str) -> str:
+def spoken(landmark: str) -> str:
+    """The words for a landmark, looked up as one: "left upper arm"."""
     name, _, side = landmark.partition(".")
     sides = {"L": "left ", "R": "right ", "": ""}
-    return sides[side] + name.replace("_", " ")
+    return as_phrase(sides[side] + name.replace("_", " "))

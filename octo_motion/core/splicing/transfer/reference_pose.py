@@ -21,6 +21,7 @@ from typing import Final
 
 import numpy as np
 
+from ...phrases import phrase
 from ...rotations import (
     IDENTITY,
     Floats,
@@ -37,6 +38,7 @@ from ...rotations import (
 from ...smoothing import smooth_step
 from ..clip import Clip, robust_direction, robust_rotations
 from ..humanoid import Landmarks
+from .parts import spoken
 
 _SAMPLES: Final = 240
 """Frames of a clip that are looked at."""
@@ -223,13 +225,15 @@ class _Finder:
         elif self._points_backwards(across[0]):
             found.append("The toes point backwards: left and right may be exchanged (Thigh, Toes).")
         for (root, middle, end), *_ in _LIMBS:
-            for side, word in (("L", "left"), ("R", "right")):
+            for side in "LR":
                 names = [f"{each}.{side}" for each in (root, middle, end)]
                 if all(each in self._bones for each in names) and self._always_straight(names):
-                    what = middle.replace("_", " ")
                     found.append(
-                        f"The {word} {what} is always straight: how the limb is turned about "
-                        "itself is as if it had swung there."
+                        phrase(
+                            "The {landmark} is always straight: how the limb is turned about "
+                            "itself is as if it had swung there.",
+                            landmark=spoken(names[1]),
+                        )
                     )
         return found
 

@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import ClipError
+from ...phrases import phrase
 from ...rotations import (
     Floats,
     conjugate,
@@ -92,7 +93,10 @@ class MappedClip:
         """The landmarks, where a part needs them."""
         if self.landmarks is None:
             raise ClipError(
-                f"It is not known which bones of '{self.clip.name}' are arms and legs.",
+                phrase(
+                    "It is not known which bones of '{clip}' are arms and legs.",
+                    clip=self.clip.name,
+                ),
                 "Map its skeleton first.",
             )
         return self.landmarks
@@ -111,7 +115,11 @@ class MappedClip:
         try:
             yield
         except ClipError as error:
-            problem = f"{error.problem.removesuffix('.')} (clip '{self.clip.name}')."
+            problem = phrase(
+                "{problem} (clip '{clip}').",
+                problem=error.problem.open_ended(),
+                clip=self.clip.name,
+            )
             raise ClipError(problem, error.remedy) from error
 
 
@@ -551,7 +559,11 @@ def _limb_joints(kind: PartKind, side: str, mapped: MappedClip) -> tuple[int, in
         for upper, lower in ((joint, elbow), (elbow, hand)):
             if upper not in skeleton.ancestors(lower):
                 raise ClipError(
-                    f"'{skeleton.names[lower]}' does not hang on '{skeleton.names[upper]}'.",
+                    phrase(
+                        "'{lower}' does not hang on '{upper}'.",
+                        lower=skeleton.names[lower],
+                        upper=skeleton.names[upper],
+                    ),
                     "Such a limb follows controls: bake its motion onto its bones first.",
                 )
     return joint, elbow, hand

@@ -19,6 +19,7 @@ from typing import Literal
 import numpy as np
 
 from ...errors import ClipError, OctoMotionError
+from ...phrases import phrase
 from ...rotations import (
     IDENTITY,
     Floats,
@@ -193,7 +194,8 @@ class Splicer:
         """Match the two skeletons; ClipError if a bone or landmark is missing."""
         if splice.travel and not (splice.part.kind is not None and splice.part.kind.travels):
             raise ClipError(
-                f"The part '{splice.part.name}' has no legs to travel with.", "Turn travel off."
+                phrase("The part '{part}' has no legs to travel with.", part=splice.part.name),
+                "Turn travel off.",
             )
         if splice.travel and splice.additive:
             raise ClipError("An additive splice has no travel.", "Turn With Travel off.")

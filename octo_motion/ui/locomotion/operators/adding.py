@@ -21,6 +21,8 @@ from ....blender.scene import (
 from ....core.errors import WriteError
 from ....core.locomotion.octopus import ARMS, JOINTS, OctopusShape
 from ....core.locomotion.path import Route
+from ....core.phrases import phrase
+from ...language import reported
 from ...operator_base import OctoOperator, show_in_local_view
 from ...panel_base import armature_in
 from ..settings import locomotion_settings
@@ -196,7 +198,14 @@ class OCTO_MOTION_OT_add_route(OctoOperator, bpy.types.Operator):
         elif armature.is_editable:
             locomotion_settings(armature).route = route
         else:
-            self.report({"WARNING"}, f"'{armature.name}' is linked: it keeps its own route.")
+            self.report(
+                {"WARNING"},
+                reported(
+                    phrase(
+                        "'{armature}' is linked: it keeps its own route.", armature=armature.name
+                    )
+                ),
+            )
 
 
 def draw_route_entry(self: bpy.types.Menu, _context: bpy.types.Context) -> None:

@@ -28,7 +28,9 @@ from ....core.locomotion.rig import (
     detect_arms,
     place_added,
 )
+from ....core.phrases import joined_phrases, phrase
 from ...declared_settings import assign
+from ...language import reported, translated
 from ...operator_base import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
 from ...panel_base import ArmaturePanel, ItemRows, draw_list
 from ..reading import add_item, body_axes, bones_of, placed_arms, write_arms, write_body
@@ -117,13 +119,18 @@ class OCTO_MOTION_OT_detect_arms(ListOperator, bpy.types.Operator):
             for chosen, before in zip((self.up, self.front), set_before, strict=True)
         )
         found, left_over = list_arms(armature, settings, up=up, front=front)
-        self.report({"INFO"}, _summary(found.arms))
+        self.report({"INFO"}, reported(_summary(found.arms)))
         for note in found.notes:
-            self.report({"WARNING"}, note)
+            self.report({"WARNING"}, reported(note))
         if left_over:
             self.report(
                 {"WARNING"},
-                f"Arms of the linked file cannot be removed here: {left_over} switched off.",
+                reported(
+                    phrase(
+                        "Arms of the linked file cannot be removed here: {left_over} switched off.",
+                        left_over=left_over,
+                    )
+                ),
             )
 
 
@@ -160,8 +167,13 @@ class OCTO_MOTION_OT_arm_add(ListOperator, bpy.types.Operator):
         if added.driven:
             self.report(
                 {"WARNING"},
-                f"Constraints or drivers move bones of '{added.name}': keys have no effect while "
-                "those are on.",
+                reported(
+                    phrase(
+                        "Constraints or drivers move bones of '{added}': keys have no effect while "
+                        "those are on.",
+                        added=added.name,
+                    )
+                ),
             )
 
 
@@ -227,7 +239,7 @@ class OCTO_MOTION_OT_arm_select(ItemOperator, bpy.types.Operator):
         hidden = hidden_bones(armature, bones)
         if len(hidden) == len(bones):
             raise RigError(
-                f"All bones of '{arm.name}' are hidden.",
+                phrase("All bones of '{arm}' are hidden.", arm=arm.name),
                 "Reveal them (Alt H in pose mode), or switch on their bone collection.",
             )
         if context.mode != "POSE":
@@ -236,8 +248,14 @@ class OCTO_MOTION_OT_arm_select(ItemOperator, bpy.types.Operator):
         if hidden:
             self.report(
                 {"WARNING"},
-                f"{len(hidden)} of {len(bones)} bones are hidden and were left out "
-                f"('{hidden[0]}' …).",
+                reported(
+                    phrase(
+                        "{count} of {total} bones are hidden and were left out ('{example}' …).",
+                        count=len(hidden),
+                        total=len(bones),
+                        example=hidden[0],
+                    )
+                ),
             )
 
 
@@ -280,11 +298,19 @@ def _split_column(layout: Any) -> Any:
 
 def _draw_details(column: Any, arm: Any) -> None:
     if arm.bones:
-        told = f"{len(arm.bones)} bones, {arm.bones[0].name} … {arm.bones[-1].name}"
-        column.label(text=told, icon="BONE_DATA")
+        told = phrase(
+            "{count} bones, {first} … {last}",
+            count=len(arm.bones),
+            first=arm.bones[0].name,
+            last=arm.bones[-1].name,
+        )
+        column.label(text=translated(told), icon="BONE_DATA")
     missing = [bone.name for bone in arm.bones if bone.name not in arm.id_data.data.bones]
     if missing:
-        column.label(text=f"No bone '{missing[0]}': detect again", icon="ERROR")
+        column.label(
+            text=translated(phrase("No bone '{missing}': detect again", missing=missing[0])),
+            icon="ERROR",
+        )
     for name in ("side", "pair", "phase", "flip", "use_weights"):
         column.prop(arm, name)
     if arm.use_weights:
@@ -295,8 +321,16 @@ def _draw_details(column: Any, arm: Any) -> None:
 
 def _summary(arms: Sequence[ArmChain]) -> str:
     counts = {
-        word: sum(arm.side == side for arm in arms)
-        for side, word in (("LEFT", "left"), ("RIGHT", "right"), ("CENTER", "in the middle"))
+        told: sum(arm.side == side for arm in arms)
+        for side, told in (
+            ("LEFT", "{count} left"),
+            ("RIGHT", "{count} right"),
+            ("CENTER", "{count} in the middle"),
+        )
     }
-    told = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
-    return f"{len(arms)} {'arm' if len(arms) == 1 else 'arms'} found: {told}."
+    told = joined_phrases(
+        ", ", (phrase(told, count=count) for told, count in counts.items() if count)
+    )
+    if len(arms) == 1:
+        return phrase("1 arm found: {told}.", told=told)
+    return phrase("{count} arms found: {told}.", count=len(arms), told=told)

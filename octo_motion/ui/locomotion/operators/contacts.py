@@ -11,6 +11,8 @@ from bpy.props import FloatProperty
 from ....blender.rig import active_armature, require_editable
 from ....blender.scene import markers, remove_markers
 from ....core.errors import OctoMotionError, SettingsError
+from ....core.phrases import phrase
+from ...language import reported, translated
 from ...operator_base import ArmatureOperator, OctoOperator, show_in_local_view
 from ...panel_base import ArmaturePanel, TabPanel, armature_in
 from ..reading import resting
@@ -44,7 +46,7 @@ class OCTO_MOTION_OT_contacts_show(ArmatureOperator, bpy.types.Operator):
             )
         count = show_contacts(armature, plan, shot.edits)
         show_in_local_view(context, *markers(armature))
-        self.report({"INFO"}, f"{count} contacts.")
+        self.report({"INFO"}, reported(phrase("{count} contacts.", count=count)))
 
 
 class OCTO_MOTION_OT_contacts_hide(ArmatureOperator, bpy.types.Operator):
@@ -82,7 +84,7 @@ class OCTO_MOTION_OT_contacts_clear(ArmatureOperator, bpy.types.Operator):
             plan = shot.plan()
         except OctoMotionError as error:
             # They are free all the same.
-            self.report({"WARNING"}, f"No markers are shown: {error}")
+            self.report({"WARNING"}, reported(phrase("No markers are shown: {error}", error=error)))
             return
         if plan.can_show_contacts:
             show_contacts(armature, plan, shot.edits)
@@ -172,7 +174,12 @@ class OCTO_MOTION_PT_ground(ArmaturePanel, bpy.types.Panel):
             row.operator(OCTO_MOTION_OT_contacts_show.bl_idname, icon="EMPTY_SINGLE_ARROW")
         row.operator(OCTO_MOTION_OT_contacts_clear.bl_idname, text="", icon="LOOP_BACK")
         if count := changed_by_hand(ground):
-            layout.label(text=f"{count} contact{'s' * (count > 1)} changed by hand", icon="PINNED")
+            one = count == 1
+            told = phrase(
+                "{count} contact changed by hand" if one else "{count} contacts changed by hand",
+                count=count,
+            )
+            layout.label(text=translated(told), icon="PINNED")
 
 
 class OCTO_MOTION_PT_contact(TabPanel, bpy.types.Panel):
@@ -189,8 +196,16 @@ class OCTO_MOTION_PT_contact(TabPanel, bpy.types.Panel):
         own = cast("Any", context.object).octo_motion.contact
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.label(text=f"{own.arm}, cycle {own.cycle}", icon="PINNED")
-        layout.label(text=f"Frames {own.frame_on:.0f} to {own.frame_off:.0f}", icon="TIME")
+        layout.label(
+            text=translated(phrase("{arm}, cycle {cycle}", arm=own.arm, cycle=own.cycle)),
+            icon="PINNED",
+        )
+        layout.label(
+            text=translated(
+                phrase("Frames {on:.0f} to {off:.0f}", on=own.frame_on, off=own.frame_off)
+            ),
+            icon="TIME",
+        )
         layout.prop(own, "locked")
         layout.prop(own, "shift")
         layout.operator(OCTO_MOTION_OT_contacts_shift.bl_idname)

@@ -24,6 +24,8 @@ from ....blender.files import (
 from ....blender.rig import active_armature
 from ....core.errors import GaitError
 from ....core.locomotion.gait import CYCLE, GaitCurve, renamed_gait
+from ....core.phrases import phrase
+from ...language import reported, translated
 from ...operator_base import ArmatureOperator, FileOperator, window_manager
 from ...panel_base import ArmaturePanel, ItemRows, draw_list
 from ..settings import (
@@ -80,7 +82,10 @@ def _row(name: str, description: str) -> Any:
 
 def _active(collection: Any, index: int, what: str) -> Any:
     if not 0 <= index < len(collection):
-        raise GaitError(f"No {what} is chosen.", f"Choose one, or add a {what}.")
+        raise GaitError(
+            phrase("No {what} is chosen.", what=what),
+            phrase("Choose one, or add a {what}.", what=what),
+        )
     return collection[index]
 
 
@@ -136,7 +141,7 @@ class OCTO_MOTION_OT_gait_save(_GaitOperator, bpy.types.Operator):
         table = renamed_gait(read_gait(settings), self.name.strip())
         save_gait(table, overwrite=self.overwrite)
         set_gait(settings, table)
-        self.report({"INFO"}, f"Saved the gait '{table.name}'.")
+        self.report({"INFO"}, reported(phrase("Saved the gait '{table}'.", table=table.name)))
 
 
 class OCTO_MOTION_OT_gait_remove(ArmatureOperator, bpy.types.Operator):
@@ -160,7 +165,7 @@ class OCTO_MOTION_OT_gait_remove(ArmatureOperator, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> None:
         name = self.name or _writable(context).gait
         remove_gait(name)
-        self.report({"INFO"}, f"Removed the gait '{name}'.")
+        self.report({"INFO"}, reported(phrase("Removed the gait '{name}'.", name=name)))
 
 
 class _GaitFile(FileOperator):
@@ -210,7 +215,12 @@ class OCTO_MOTION_OT_gait_export(_GaitFile, ArmatureOperator, bpy.types.Operator
         table = read_gait(locomotion_settings(active_armature(context)))
         path = self._path()
         write_gait(table, path)
-        self.report({"INFO"}, f"Wrote the gait '{table.name}' to '{path.name}'.")
+        self.report(
+            {"INFO"},
+            reported(
+                phrase("Wrote the gait '{table}' to '{path}'.", table=table.name, path=path.name)
+            ),
+        )
 
 
 class OCTO_MOTION_OT_gait_import(_GaitFile, _GaitOperator, bpy.types.Operator):
@@ -242,7 +252,10 @@ class OCTO_MOTION_OT_gait_curve_add(_GaitOperator, bpy.types.Operator):
         taken = set(table.curves)
         pair = self.pair or next(each for each in range(1, len(taken) + 2) if each not in taken)
         if pair in taken:
-            raise GaitError(f"Pair {pair} has angles of its own already.", "Choose another pair.")
+            raise GaitError(
+                phrase("Pair {pair} has angles of its own already.", pair=pair),
+                "Choose another pair.",
+            )
         curves = {**table.curves, pair: table.curves[0]}
         fill_table(_editable_table(settings), replace(table, curves=curves))
         settings.table.active_curve = sorted(curves).index(pair)
@@ -279,7 +292,9 @@ class OCTO_MOTION_OT_gait_knot_add(_GaitOperator, bpy.types.Operator):
         if listed:
             phases = [each.phase for each in used(listed[settings.table.active_curve].knots)]
         if self.knot >= len(phases):
-            raise GaitError(f"There is no row {self.knot}.", "Choose a knot of the table.")
+            raise GaitError(
+                phrase("There is no row {knot}.", knot=self.knot), "Choose a knot of the table."
+            )
         if self.knot < 0:
             gap = int(np.argmax(np.diff(shape.phases)))
         else:
@@ -315,7 +330,9 @@ class OCTO_MOTION_OT_gait_knot_remove(_GaitOperator, bpy.types.Operator):
         count = len(shape.phases) - 1
         knot = self.knot if self.knot >= 0 else count - 1
         if knot >= count:
-            raise GaitError(f"There is no row {knot}.", "Choose a knot of the table.")
+            raise GaitError(
+                phrase("There is no row {knot}.", knot=knot), "Choose a knot of the table."
+            )
         if knot == 0:
             raise GaitError("A cycle cannot do without its first knot.", "Change its angles.")
         shape = GaitCurve(
@@ -336,7 +353,11 @@ class OCTO_MOTION_OT_gait_offset_add(_GaitOperator, bpy.types.Operator):
         table = read_gait(settings)
         if (self.pair, self.side) in table.offsets:
             raise GaitError(
-                f"Pair {self.pair} {self.side.lower()} has an offset already.",
+                phrase(
+                    "Pair {pair} {side} has an offset already.",
+                    pair=self.pair,
+                    side=self.side.lower(),
+                ),
                 "Change that one, or choose another arm.",
             )
         offsets = {**table.offsets, (self.pair, self.side): 0.0}
@@ -442,7 +463,17 @@ def _draw_offsets(layout: Any, table: OCTO_MOTION_PG_gait_table) -> None:
     column = layout.column(align=True)
     for number, offset in enumerate(used(table.offsets)):
         row = column.row(align=True)
-        row.prop(offset, "phase", text=f"Arm {offset.pair} {_SIDE_LETTERS[offset.side]}")
+        row.prop(
+            offset,
+            "phase",
+            text=translated(
+                phrase(
+                    "Arm {pair} {side_letter}",
+                    pair=offset.pair,
+                    side_letter=_SIDE_LETTERS[offset.side],
+                )
+            ),
+        )
         remove = row.operator(
             OCTO_MOTION_OT_gait_offset_remove.bl_idname, text="", icon="X", emboss=False
         )

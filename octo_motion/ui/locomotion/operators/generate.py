@@ -26,7 +26,9 @@ from ....blender.animation import is_edited, may_replace
 from ....blender.rig import active_armature, deformed_meshes, read_skeleton
 from ....core.content_cache import clear_caches, content_key
 from ....core.errors import OctoMotionError, RigError
+from ....core.phrases import phrase
 from ...declared_settings import assign, plain
+from ...language import reported, translated
 from ...modal_job import Job, ModalJob
 from ...operator_base import ArmatureOperator
 from ..reading import playing_action, previous_action
@@ -65,7 +67,7 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
         try:
             self._shots = [prepare(each, context) for each in _meant(context)]
         except OctoMotionError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, reported(error))
             return {"CANCELLED"}
         return self.begin(context, make(self._shots), PATIENCE)
 
@@ -85,13 +87,15 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
         return {"FINISHED"}
 
     def status(self, progress: float) -> str:
-        return f"Generating locomotion: {100.0 * progress:.0f} %    Esc: stop"
+        return phrase(
+            "Generating locomotion: {progress:.0f} %    Esc: stop", progress=100.0 * progress
+        )
 
     def _tell(self, summary: Summary) -> None:
-        self.report({"INFO"}, summary.message)
+        self.report({"INFO"}, reported(summary.message))
         # Blender's status bar keeps the last, which is to be the one that says most.
         for warning in reversed(summary.warnings):
-            self.report({"WARNING"}, warning)
+            self.report({"WARNING"}, reported(warning))
 
 
 def _meant(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -534,11 +538,11 @@ def _telling(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) ->
         yield
     except OctoMotionError as error:
         _let_go(armature)
-        settings.live_error = str(error)
+        settings.live_error = translated(error)
     except BaseException:
         _let_go(armature)
         settings.live = False
-        settings.live_error = "Live has stopped at a fault: the console tells which."
+        settings.live_error = translated("Live has stopped at a fault: the console tells which.")
         raise
 
 
@@ -580,7 +584,7 @@ def _write(
         return
     if kept := _whose(armature, settings):
         settings.live = False
-        settings.live_error = kept
+        settings.live_error = translated(kept)
         _state.seen.pop(armature.name, None)
         _let_go(armature)
         return
@@ -620,12 +624,12 @@ def _whose(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> s
     """Why the armature's action must be left alone, "" if it is ours."""
     previous, playing = previous_action(armature, settings), playing_action(armature)
     if playing is not None and playing != previous:
-        return f"Live is off: '{playing.name}' is not what was generated."
+        return phrase("Live is off: '{playing}' is not what was generated.", playing=playing.name)
     if previous is None or may_replace(previous, armature):
         return ""
     if is_edited(previous):
-        return f"Live is off: '{previous.name}' was edited and is yours."
-    return f"Live is off: '{previous.name}' has other users too."
+        return phrase("Live is off: '{previous}' was edited and is yours.", previous=previous.name)
+    return phrase("Live is off: '{previous}' has other users too.", previous=previous.name)
 
 
 def _made_from(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> str:

@@ -12,6 +12,8 @@ from bpy.props import EnumProperty
 from ....blender.rig import active_armature
 from ....core.errors import RigError, SettingsError
 from ....core.locomotion.metrics import TOLD
+from ....core.phrases import Phrase, as_phrase, phrase
+from ...language import hinted, reported, translated
 from ...operator_base import ArmatureOperator
 from ...panel_base import ArmaturePanel, armature_in
 from ..settings import KIND_NAMES, KINDS, known_figures, locomotion_settings
@@ -27,7 +29,7 @@ def shown(kind: str, value: float) -> str:
     if kind == "TURN":
         return f"{np.degrees(value):.1f}°"
     if kind == "OVERLAP":
-        return f"{value:.2f} radii"
+        return phrase("{value:.2f} radii", value=value)
     percent = 100.0 * value
     # The aims are hundredths of a percent; of what is large nobody wants to know so much.
     return f"{percent:.2f} %" if percent < 1.0 else f"{percent:.1f} %"
@@ -39,10 +41,12 @@ def _is_seen(item: Any) -> bool:
     return not item.value <= TOLD.get(item.kind, np.inf)
 
 
-def _told(item: Any) -> str:
+def _told(item: Any, *, whose: bool = True) -> Phrase:
     """A figure, and the arm that it is of."""
-    told = f"{KIND_NAMES[item.kind]}: {shown(item.kind, item.value)}"
-    return f"{told}, {item.arm}" if item.arm else told
+    kind, value = as_phrase(KIND_NAMES[item.kind]), shown(item.kind, item.value)
+    if item.arm and whose:
+        return phrase("{kind}: {value}, {arm}", kind=kind, value=value, arm=item.arm)
+    return phrase("{kind}: {value}", kind=kind, value=value)
 
 
 def _figure(context: bpy.types.Context, kind: str) -> Any:
@@ -70,17 +74,27 @@ class OCTO_MOTION_OT_quality_jump(ArmatureOperator, bpy.types.Operator):
         if item is None:
             return cls.bl_description
         meaning = next(told for kind, _, told, _ in KINDS if kind == item.kind)
-        return f"{meaning}. Go to frame {item.frame}, where it is worst. {_told(item)}"
+        return hinted(
+            phrase(
+                "{meaning}. Go to frame {frame}, where it is worst. {told}",
+                meaning=as_phrase(meaning),
+                frame=item.frame,
+                told=_told(item),
+            )
+        )
 
     def run(self, context: bpy.types.Context) -> None:
         item = _figure(context, self.kind)
         if item is None:
             raise SettingsError(
-                f"Nothing is known of {KIND_NAMES[self.kind].lower()}.", "Generate a motion first."
+                phrase(
+                    "Nothing is known of {kind}.", kind=as_phrase(KIND_NAMES[self.kind].lower())
+                ),
+                "Generate a motion first.",
             )
         assert context.scene is not None
         context.scene.frame_set(item.frame)
-        self.report({"INFO"}, f"{_told(item)}.")
+        self.report({"INFO"}, reported(phrase("{told}.", told=_told(item))))
 
 
 class OCTO_MOTION_PT_quality(ArmaturePanel, bpy.types.Panel):
@@ -114,8 +128,8 @@ class OCTO_MOTION_PT_quality(ArmaturePanel, bpy.types.Panel):
             row = column.split(factor=_WORDS, align=True)
             words = row.row()
             words.alert = seen
-            told = f"{KIND_NAMES[item.kind]}: {shown(item.kind, item.value)}"
-            words.label(text=told, icon=_MARK if seen else "BLANK1")
+            told = _told(item, whose=False)
+            words.label(text=translated(told), icon=_MARK if seen else "BLANK1")
             jump = row.operator(
                 OCTO_MOTION_OT_quality_jump.bl_idname, text=f"{item.frame}", icon="TIME"
             )
@@ -123,4 +137,4 @@ class OCTO_MOTION_PT_quality(ArmaturePanel, bpy.types.Panel):
             for arm in item.arm.split(", ") if seen and item.arm else ():
                 whose = column.row()
                 whose.alert = True
-                whose.label(text=arm, icon="BLANK1")
+                whose.label(text=arm, icon="BLANK1", translate=False)

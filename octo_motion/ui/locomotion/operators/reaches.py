@@ -13,6 +13,7 @@ from ....blender.files import gait_names, has_gait, load_gait
 from ....blender.rig import active_armature, require_editable
 from ....blender.scene import WITH_SURFACE
 from ....core.errors import RigError, SettingsError
+from ....core.phrases import phrase
 from ...declared_settings import free_name
 from ...operator_base import ArmatureOperator, ListKind, ListOperator, RemoveOperator
 from ...panel_base import ArmaturePanel, ItemRows, draw_list
@@ -110,7 +111,7 @@ class OCTO_MOTION_OT_reach_add(ArmatureOperator, bpy.types.Operator):
             found = bpy.data.objects.get(self.target)
             if found is None or found.type not in WITH_SURFACE:
                 raise SettingsError(
-                    f"There is no object '{self.target}' with a surface.",
+                    phrase("There is no object '{target}' with a surface.", target=self.target),
                     "Choose an object with faces.",
                 )
             return found
@@ -123,7 +124,7 @@ class OCTO_MOTION_OT_reach_add(ArmatureOperator, bpy.types.Operator):
         ]
         if len(others) > 1:
             raise SettingsError(
-                f"{len(others)} other objects are selected.",
+                phrase("{count} other objects are selected.", count=len(others)),
                 "Select one object, then Shift click the creature.",
             )
         return others[0] if others else None
@@ -132,7 +133,8 @@ class OCTO_MOTION_OT_reach_add(ArmatureOperator, bpy.types.Operator):
         if self.arm:
             if self.arm not in settings.arms:
                 raise RigError(
-                    f"There is no arm '{self.arm}' in the list.", "Choose one of the list's arms."
+                    phrase("There is no arm '{arm}' in the list.", arm=self.arm),
+                    "Choose one of the list's arms.",
                 )
             return self.arm
         bone = context.active_pose_bone

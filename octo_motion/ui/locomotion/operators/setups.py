@@ -20,6 +20,7 @@ from ....blender.animation import writable_armature
 from ....blender.files import load_gait
 from ....blender.rig import active_armature
 from ....core.errors import OctoMotionError, SettingsError
+from ....core.phrases import as_phrase, phrase
 from ...declared_settings import assign, plain
 from ...operator_base import ARMATURE, ArmatureOperator, ArmaturePresetAdd, window_manager
 from ..settings import (
@@ -143,7 +144,8 @@ class OCTO_MOTION_OT_setup_load(ArmatureOperator, bpy.types.Operator):
         path = paths.get(self.name)
         if path is None:
             raise SettingsError(
-                f"There is no set-up '{self.name}'.", f"Choose one of {', '.join(paths)}."
+                phrase("There is no set-up '{name}'.", name=self.name),
+                phrase("Choose one of {names}.", names=", ".join(paths)),
             )
         settings: Any = locomotion_settings(armature)
         owned = ("travel_on", "gait", *governed())
@@ -165,7 +167,11 @@ class OCTO_MOTION_OT_setup_load(ArmatureOperator, bpy.types.Operator):
             # At last: the name of a gait, when it is set, fills the table.
             _put_back(settings.table, table)
             raise SettingsError(
-                f"The set-up '{self.name}' is damaged: {str(error).rstrip('.')}.",
+                phrase(
+                    "The set-up '{name}' is damaged: {error}.",
+                    name=self.name,
+                    error=as_phrase(error).open_ended(),
+                ),
                 "Remove it, or keep it anew.",
             ) from error
         settings.setup = self.name
@@ -250,7 +256,7 @@ def _item(*key: Any) -> tuple[str, str, str, int, int]:
     if key not in _items:
         name, icon, number = key
         shown = shown_name(name)
-        _items[key] = name, shown, f"Move like this: {shown}", icon, number
+        _items[key] = name, shown, phrase("Move like this: {shown}", shown=shown), icon, number
     return _items[key]
 
 

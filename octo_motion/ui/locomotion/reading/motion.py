@@ -39,6 +39,7 @@ from ....core.locomotion.motion import (
 from ....core.locomotion.path import TravelSettings
 from ....core.locomotion.reaching import Reach, Reaching, Timeline, profile_of
 from ....core.locomotion.rig import frames_of_arm
+from ....core.phrases import phrase
 from ....core.rotations import Floats
 from ...declared_settings import read_settings
 from ..settings import (
@@ -205,7 +206,7 @@ def read_ground(
     if ground.object is not None and settings.travel_on != "NONE":
         mesh = read_triangles(ground.object, depsgraph)
         if len(ground.object.modifiers) > 0 and not is_enabled(ground.object, depsgraph):
-            warnings = (_BARE.format(name=ground.object.name),)
+            warnings = (phrase(_BARE, name=ground.object.name),)
     return GroundJob(
         stance=read_settings(StanceSettings, ground),
         skins=arm_skins(armature, creature.at_rest, creature.bones),
@@ -286,11 +287,16 @@ def _reach(item: Any, armature: bpy.types.Object, frames: Floats) -> Reach:
         return Reach(item.name, item.arm, item.mode, 0.0, timeline, "", None, *still)
     if item.target is None:
         raise SettingsError(
-            f"The reach '{item.name}' has no object.", "Choose what it reaches for, or mute it."
+            phrase("The reach '{item}' has no object.", item=item.name),
+            "Choose what it reaches for, or mute it.",
         )
     if hangs_on(item.target, armature):
         raise SettingsError(
-            f"'{item.target.name}' hangs on '{armature.name}', which reaches for it.",
+            phrase(
+                "'{target}' hangs on '{armature}', which reaches for it.",
+                target=item.target.name,
+                armature=armature.name,
+            ),
             "Clear its parent and its constraints to the armature.",
         )
     carry = item.carry or brings
@@ -298,9 +304,12 @@ def _reach(item: Any, armature: bpy.types.Object, frames: Floats) -> Reach:
         writable_object(item.target)
         if not can_be_carried(item.target):
             raise SettingsError(
-                f"'{item.target.name}' moves by itself and cannot be carried.",
-                "Remove its action, constraints and physics, or "
-                + ("let the arm coil." if brings else "switch Carry off."),
+                phrase(
+                    "'{target}' moves by itself and cannot be carried.", target=item.target.name
+                ),
+                "Remove its action, constraints and physics, or let the arm coil."
+                if brings
+                else "Remove its action, constraints and physics, or switch Carry off.",
             )
     axis = np.array(_AXES[item.axis]) if item.axis in _AXES else None
     profile = profile_of(*read_form(item.target), axis)

@@ -47,6 +47,7 @@ from ....core.locomotion.rig import (
     is_driven,
     nearest_axis,
 )
+from ....core.phrases import phrase
 from ....core.rotations import Floats
 from ....core.skeleton import Skeleton
 from ...declared_settings import assign, emptied, free_name
@@ -291,22 +292,25 @@ def chosen_root_bone(
         return ""
     if not name:
         raise RigError(
-            f"'{armature.name}' has no root bone.",
+            phrase("'{armature}' has no root bone.", armature=armature.name),
             "Choose the bone that carries the body, or let the object travel.",
         )
     bone = armature_data(armature).bones.get(name)
     if bone is None:
         raise RigError(
-            f"'{armature.name}' has no bone '{name}' to travel on.", "Choose another root bone."
+            phrase(
+                "'{armature}' has no bone '{name}' to travel on.", armature=armature.name, name=name
+            ),
+            "Choose another root bone.",
         )
     if bone.use_connect and bone.parent is not None:
         raise RigError(
-            f"The root bone '{name}' is connected to its parent and cannot move.",
+            phrase("The root bone '{name}' is connected to its parent and cannot move.", name=name),
             "Disconnect it, or choose the topmost bone.",
         )
     if not bone.use_local_location and bone.parent is not None:
         raise RigError(
-            f"The root bone '{name}' does not move along its own axes.",
+            phrase("The root bone '{name}' does not move along its own axes.", name=name),
             "Switch on Local Location in its Relations, or choose the topmost bone.",
         )
     return name
@@ -322,14 +326,21 @@ def warnings_for_driven(
     told: list[str] = []
     if root_bone and is_driven(skeleton, [root_bone]):
         told.append(
-            f"Constraints or drivers move the root bone '{root_bone}': its keys have no "
-            "effect while those are on."
+            phrase(
+                "Constraints or drivers move the root bone '{root_bone}': its keys have no "
+                "effect while those are on.",
+                root_bone=root_bone,
+            )
         )
     travels = settings.travel_on == "OBJECT"
     if travels and any(not each.mute and each.influence > 0.0 for each in armature.constraints):
-        told.append(f"Constraints move '{armature.name}' away from its route.")
+        told.append(
+            phrase("Constraints move '{armature}' away from its route.", armature=armature.name)
+        )
     if travels and is_driven_object(armature):
-        told.append(f"Drivers move '{armature.name}' away from its route.")
+        told.append(
+            phrase("Drivers move '{armature}' away from its route.", armature=armature.name)
+        )
     return told
 
 
@@ -338,16 +349,18 @@ def warnings_for_driven_arms(skeleton: Skeleton, arms: tuple[Arm, ...]) -> list[
     bones = [bone for arm in arms for bone in arm.bones if is_driven(skeleton, [bone])]
     if not bones:
         return []
-    told = (
-        f"Constraints or drivers move {_counted(bones)} of the arms "
-        f"('{bones[0]}'{' …' * (len(bones) > 1)}): keys there have little or no effect while those "
-        "are on."
+    told = phrase(
+        "Constraints or drivers move {bones} of the arms ('{example}'{more}): keys there have "
+        "little or no effect while those are on.",
+        bones=_counted(bones),
+        example=bones[0],
+        more=" …" if bones[1:] else "",
     )
     return [told]
 
 
 def _counted(bones: Sequence[str]) -> str:
-    return "one bone" if len(bones) == 1 else f"{len(bones)} bones"
+    return phrase("one bone") if len(bones) == 1 else phrase("{count} bones", count=len(bones))
 
 
 def warnings_for_display(armature: bpy.types.Object, render: bpy.types.RenderSettings) -> list[str]:
@@ -355,14 +368,20 @@ def warnings_for_display(armature: bpy.types.Object, render: bpy.types.RenderSet
     told = warnings_for_layers(armature)
     if armature_data(armature).pose_position == "REST":
         told.append(
-            f"'{armature.name}' is shown in its rest position: its arms do not move. Choose Pose "
-            "Position in the properties of the armature."
+            phrase(
+                "'{armature}' is shown in its rest position: its arms do not move. Choose Pose "
+                "Position in the properties of the armature.",
+                armature=armature.name,
+            )
         )
     if render.frame_map_old != render.frame_map_new:
         told.append(
-            f"The scene stretches time ({render.frame_map_old} to {render.frame_map_new}): the "
-            "motion plays at another speed than it was made for. Set both to the same number in "
-            "the output properties."
+            phrase(
+                "The scene stretches time ({old} to {new}): the motion plays at another speed "
+                "than it was made for. Set both to the same number in the output properties.",
+                old=render.frame_map_old,
+                new=render.frame_map_new,
+            )
         )
     return told
 
@@ -375,11 +394,14 @@ def warnings_for_layers(armature: bpy.types.Object) -> list[str]:
         return []
     name = f"'{armature.name}'"
     if any(track.is_solo for track in tracks):
-        return [f"A solo NLA track of {name} hides the motion. Switch its star off."]
+        return [
+            phrase("A solo NLA track of {name} hides the motion. Switch its star off.", name=name)
+        ]
     if data.action_blend_type != "REPLACE" or data.action_influence < 1.0:
-        told = (
-            f"The NLA mixes the motion of {name} with its tracks. In the NLA editor's sidebar set "
-            "Blending to Replace and Influence to 1 if it should not."
+        told = phrase(
+            "The NLA mixes the motion of {name} with its tracks. In the NLA editor's "
+            "sidebar set Blending to Replace and Influence to 1 if it should not.",
+            name=name,
         )
         return [told]
     return []
@@ -427,9 +449,11 @@ def warnings_for_poses(
     found = [*displaced_bones(armature, turned, ()), *carriers]
     if not found:
         return []
-    told = (
-        f"The pose of {_counted(found)} moves the arms ('{found[0]}'): the body stands off its "
-        "route by that. Clear it (Alt G, Alt R, Alt S in pose mode) if it should not."
+    told = phrase(
+        "The pose of {bones} moves the arms ('{example}'): the body stands off its route by "
+        "that. Clear it (Alt G, Alt R, Alt S in pose mode) if it should not.",
+        bones=_counted(found),
+        example=found[0],
     )
     return [told]
 

@@ -31,6 +31,7 @@ from ....core.locomotion.gait import (
     gait_presets,
     gait_to_json,
 )
+from ....core.phrases import phrase
 from ....core.rotations import Floats
 from ... import declared_settings as props
 from ...declared_settings import assign
@@ -90,7 +91,7 @@ def _text(group: OCTO_MOTION_PG_gait_table) -> str:
 
 def _set_text(group: OCTO_MOTION_PG_gait_table, text: str) -> None:
     try:
-        table = gait_from_json(text, "text")
+        table = gait_from_json(text, phrase("The text"))
     except GaitError:
         # Blender only prints what a property's setter raises. A name that is not the chosen
         # gait's makes everyone say so.
@@ -327,7 +328,7 @@ def read_table(group: OCTO_MOTION_PG_gait_table, preset: GaitTable | None = None
         curves = {curve.pair: read_curve(curve) for curve in listed}
         if len(curves) < len(listed):
             raise GaitError(
-                f"Gait '{group.name}' has two curves for one pair of arms.",
+                phrase("Gait '{group}' has two curves for one pair of arms.", group=group.name),
                 "Remove one, or change its pair.",
             )
     else:

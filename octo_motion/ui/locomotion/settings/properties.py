@@ -20,6 +20,7 @@ from ....core.errors import GaitError
 from ....core.locomotion.gait import GaitSettings, GaitTable
 from ....core.locomotion.metrics import Figure
 from ....core.locomotion.path import TravelSettings
+from ....core.phrases import phrase
 from ... import declared_settings as props
 from ...declared_settings import declared, emptied, make_overridable
 from .gait import (
@@ -206,7 +207,11 @@ def read_gait(settings: Movement) -> GaitTable:
     preset = load_gait(settings.gait)
     if used(settings.table.curves):
         raise GaitError(
-            f"The gait '{settings.gait}' is not loaded, '{settings.table.name}' is.",
+            phrase(
+                "The gait '{gait}' is not loaded, '{table}' is.",
+                gait=settings.gait,
+                table=settings.table.name,
+            ),
             "Choose the gait anew.",
         )
     return read_table(settings.table, preset)

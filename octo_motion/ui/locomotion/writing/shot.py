@@ -40,6 +40,7 @@ from ....core.locomotion.motion import (
 )
 from ....core.locomotion.reaching import Carried
 from ....core.locomotion.rig import Detection
+from ....core.phrases import as_phrase, joined_phrases, phrase
 from ....core.rotations import Floats
 from ...declared_settings import assign, plain
 from ..reading import (
@@ -107,12 +108,19 @@ class Summary:
     @property
     def message(self) -> str:
         """One sentence, and the notes."""
-        told = (
-            f"{bpy.path.display_name(self.gait)} of {self.frames} frames ({self.lasts:.1f} s): "
-            f"'{self.action}'."
+        told = phrase(
+            "{gait} of {frames} frames ({lasts:.1f} s): '{action}'.",
+            gait=as_phrase(bpy.path.display_name(self.gait)),
+            frames=self.frames,
+            lasts=self.lasts,
+            action=self.action,
         )
-        fewer = f"{self.keys:,} keys instead of {self.dense_keys:,}."
-        return " ".join([told, *([fewer] * (self.keys < self.dense_keys)), *self.notes])
+        fewer = phrase(
+            "{keys:,} keys instead of {dense_keys:,}.", keys=self.keys, dense_keys=self.dense_keys
+        )
+        return joined_phrases(
+            " ", (told, fewer if self.keys < self.dense_keys else "", *self.notes)
+        )
 
 
 # --- Objects that arms carry: the keys of their ways ----------------------------------------------
@@ -203,7 +211,9 @@ class Shot:
         assert made is not None
         armature = bpy.data.objects.get((self.armature, None))
         if armature is None:
-            raise WriteError(f"'{self.armature}' is gone.", "Generate again.")
+            raise WriteError(
+                phrase("'{armature}' is gone.", armature=self.armature), "Generate again."
+            )
         writable_armature(armature)
         settings = locomotion_settings(armature)
         action = self._write_action(armature, settings, made, unedited=unedited)
@@ -353,11 +363,15 @@ class Shot:
         ]
         found = [each for each in found if each.data_path not in keyed]
         if bones := sorted({each.group for each in found}):
-            one = len(bones) == 1
-            told = (
-                f"'{bones[0]}' is" if one else f"'{bones[0]}' and {len(bones) - 1} more bones are"
+            told = phrase(
+                "'{bone}' is posed, and keyed at rest; Keep Pose lets that pose count."
+                if len(bones) == 1
+                else "'{bone}' and {count} more bones are posed, and keyed at rest; Keep Pose lets "
+                "that pose count.",
+                bone=bones[0],
+                count=len(bones) - 1,
             )
-            self.told = (f"{told} posed, and keyed at rest; Keep Pose lets that pose count.",)
+            self.told = (told,)
         return found
 
     def _extend_range(self, settings: OCTO_MOTION_PG_locomotion, last: int) -> tuple[str, ...]:
@@ -367,7 +381,9 @@ class Shot:
             return ()
         if not (self.extend_scene_range and scene.is_editable):
             over = last > scene.frame_end
-            told = f"It lasts to frame {last}, the scene ends at {scene.frame_end}."
+            told = phrase(
+                "It lasts to frame {last}, the scene ends at {end}.", last=last, end=scene.frame_end
+            )
             return (told,) if over else ()
         before = scene.frame_end
         # What it was extended for itself is taken back, unless somebody has changed it since.
@@ -376,7 +392,9 @@ class Shot:
         assign(settings, "extended_from", own)
         assign(settings, "extended_to", scene.frame_end if last > own else 0)
         changed = scene.frame_end != before
-        return (f"The scene now ends at frame {scene.frame_end}.",) if changed else ()
+        return (
+            (phrase("The scene now ends at frame {end}.", end=scene.frame_end),) if changed else ()
+        )
 
 
 def show_contacts(
@@ -506,14 +524,19 @@ def _check_route(settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object
     """A route has to be there; one that its own traveller carries would be elsewhere each time."""
     if settings.route is None and settings.travel_on != "NONE":
         raise RouteError(
-            f"'{armature.name}' has no route.", "Choose a curve as its route, or add one."
+            phrase("'{armature}' has no route.", armature=armature.name),
+            "Choose a curve as its route, or add one.",
         )
     route = child = settings.route
     while route is not None and child is not None and child.parent is not None:
         carried = settings.travel_on == "OBJECT" or child.parent_type == "BONE"
         if child.parent == armature and carried:
             raise RouteError(
-                f"The route '{route.name}' hangs on '{armature.name}' and would move with it.",
+                phrase(
+                    "The route '{route}' hangs on '{armature}' and would move with it.",
+                    route=route.name,
+                    armature=armature.name,
+                ),
                 "Clear its parent (Alt P).",
             )
         child = child.parent
