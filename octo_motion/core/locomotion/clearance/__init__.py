@@ -14,6 +14,7 @@ from .corrections import (
     raise_between_frames,
     separate_arms,
 )
+from .eased_turns import eased_turns
 
 __all__ = [
     "DEEP",
@@ -24,6 +25,7 @@ __all__ = [
     "Opened",
     "Separation",
     "afloat",
+    "eased_turns",
     "joints_that_count",
     "keep_off_ground",
     "lead_past",

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -65,6 +66,9 @@ _NEAR, _NEARER = 0.60, 0.28
 _FAR, _FARTHER = 0.94, 0.47
 """Shares of the free part of an arm between which a place may be that it pushes away from, and by
 how much more these are for each length that it may get longer by."""
+_WOUND: Final = np.radians(45.0)
+"""Turn of the body within a hold from which on it is cut down. On a circle of 0.17 arm lengths arms
+that hold on are 0.1 arm lengths below the ground, and turn by 176° in a frame, without that."""
 _ROUNDS: Final = 3
 """How often a foothold is moved, and the ground under it looked at again. Twice changes no figure
 by more than a tenth."""
@@ -502,7 +506,19 @@ def _places(
     distance, half = spots(limbs, ground, settings, passings, aim=aim, away=away + farther)
     spot = roots.copy()
     spot[..., :2] += distance[..., None] * aim
-    return spot, lie, half
+    return spot, lie, half * _unturned(path, shift, half)
+
+
+def _unturned(path: _RootPath, shift: Floats, half: Floats) -> Floats:
+    """Shares (arms, cycles) that holds are cut down to where the body turns too far meanwhile.
+
+    An arm that lies where it lies while the body turns is wound round it, and lets go wildly.
+    """
+    ways = [_ahead(path.limbs, path.at(shift + each)[1])[0] for each in (-half, 0.0 * half, half)]
+    turned = sum(
+        np.arccos(np.clip(np.sum(one * other, axis=-1), -1.0, 1.0)) for one, other in pairwise(ways)
+    )
+    return 1.0 / (1.0 + np.maximum(turned / _WOUND - 1.0, 0.0))
 
 
 def relaid(footholds: Footholds, limbs: Limbs, ground: Ground, skins: Floats) -> Footholds:

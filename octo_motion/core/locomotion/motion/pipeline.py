@@ -19,6 +19,7 @@ from ...rotations import IDENTITY, Floats, from_matrix, rotate, slerp
 from ..clearance import (
     ArmsOverGround,
     Opened,
+    eased_turns,
     keep_off_ground,
     lead_past,
     raise_between_frames,
@@ -197,6 +198,7 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     swimming = segments.swimming(travel.distance)
     reached = _reach(plan, arms, keyed, going)
     warnings = _separate(plan, arms, reached, going, swimming=swimming, cyclic=cyclic)
+    _take_time(plan, arms, reached, going, cyclic=cyclic)
     return _Posed(arms, going, keyed, swimming, reached, warnings)
 
 
@@ -398,6 +400,36 @@ def _separate(
     if moved is not None:
         arms.rotations = moved
     return []
+
+
+def _take_time(
+    plan: MotionPlan,
+    arms: ArmMotion,
+    reached: Reached | None,
+    going: Travelled,
+    *,
+    cyclic: bool,
+) -> None:
+    """Let bones that would turn too fast for an eye take their time, off the ground."""
+    job, every = plan.job, plan.stride
+    creature, ground = job.creature, _underfoot(plan)
+    busy = reached.away > 0.0 if reached is not None else np.zeros(arms.late.shape, dtype=bool)
+    held = [
+        (lying.any(axis=1) & (late <= MISS)) | own
+        for lying, late, own in zip(arms.in_contact, arms.late.T, busy.T, strict=True)
+    ]
+    frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
+    pace = {"rate": every * job.timing.rate, "per_cycle": every * plan.pace.fastest}
+    for last in (False, False, True):
+        eased = eased_turns(frames, arms.rotations, going[1], held, **pace, cyclic=cyclic)
+        if eased is None:
+            return
+        arms.rotations, changed = eased
+        if ground is not None and not last:
+            course = ArmsOverGround(frames, ground, creature.scale, cyclic=cyclic)
+            poses = Poses(arms.rotations, arms.strains, *going)
+            radii = [creature.scale * each for each in plan.standing[0].radii]
+            arms.rotations = keep_off_ground(course, poses, radii, changed)
 
 
 def _opened(plan: MotionPlan, count: int, swimming: Floats | None) -> Opened | None:

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What would turn too fast for an eye takes its time; all else stays as it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from octo_motion.core.locomotion.clearance.eased_turns import eased_turns
+from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_arm
+from octo_motion.core.rotations import Floats, from_axis_angle
+from tests.core.rigs import body_with_arms
+
+FRAMES = 240
+FASTEST = np.radians(28.0) * 24.0
+"""Radians a second."""
+SLOWLY = 1e6
+"""Frames of a cycle."""
+STILL = np.tile([1.0, 0.0, 0.0, 0.0], (FRAMES, 1))
+
+
+def arms_of() -> list[ArmFrames]:
+    skeleton, arms, body = body_with_arms(4, 6)
+    return [frames_of_arm(skeleton, arm.bones, body) for arm in arms]
+
+
+def flipping(angle: float, at: int, arms: int, bones: int, bone: int) -> Floats:
+    """All bones at rest, but one of the first arm that turns at once."""
+    result = np.zeros((FRAMES, arms * bones, 4))
+    result[..., 0] = 1.0
+    result[at:, bone] = from_axis_angle(np.array([1.0, 0.0, 0.0]), np.array(angle))
+    return result
+
+
+def largest(rotations: Floats) -> float:
+    """Radians a frame."""
+    same = np.abs(np.sum(rotations[1:] * rotations[:-1], axis=-1))
+    return float(2.0 * np.arccos(np.minimum(same, 1.0)).max())
+
+
+@pytest.mark.parametrize("rate", [24.0, 96.0])
+@pytest.mark.parametrize("degrees", [50.0, 160.0])
+def test_a_bone_that_flips_in_the_air_takes_its_time(rate: float, degrees: float) -> None:
+    arms = arms_of()
+    bones = len(arms[0].bones)
+    rotations = flipping(np.radians(degrees), 120, len(arms), bones, 3)
+    free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
+    found = eased_turns(arms, rotations, STILL, free, rate=rate, per_cycle=SLOWLY)
+    assert found is not None
+    eased, changed = found
+    assert largest(eased) <= 1.001 * FASTEST / rate
+    # Long before and after it, and of the other arms, nothing is changed.
+    np.testing.assert_array_equal(eased[:, bones:], rotations[:, bones:])
+    some = changed[:, 0] > 0.0
+    np.testing.assert_array_equal(eased[~some], rotations[~some])
+    assert not some[[0, -1]].any()
+    assert not changed[:, 1:].any()
+
+
+def test_what_is_slow_enough_is_left_alone() -> None:
+    arms = arms_of()
+    rotations = flipping(0.9 * FASTEST / 24.0, 120, len(arms), len(arms[0].bones), 3)
+    free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
+    assert eased_turns(arms, rotations, STILL, free, rate=24.0, per_cycle=SLOWLY) is None
+
+
+def test_an_arm_that_holds_on_lets_go_only_of_what_would_pop() -> None:
+    arms = arms_of()
+    bones = len(arms[0].bones)
+    held = [np.ones(FRAMES, dtype=bool)] * len(arms)
+    some = flipping(1.2 * FASTEST / 24.0, 120, len(arms), bones, 3)
+    assert eased_turns(arms, some, STILL, held, rate=24.0, per_cycle=SLOWLY) is None
+    found = eased_turns(
+        arms,
+        flipping(np.radians(120.0), 120, len(arms), bones, 3),
+        STILL,
+        held,
+        rate=24.0,
+        per_cycle=SLOWLY,
+    )
+    assert found is not None
+    assert largest(found[0]) < np.radians(45.0)
+
+
+def test_a_gait_in_a_hurry_may_turn_faster() -> None:
+    arms = arms_of()
+    rotations = flipping(np.radians(40.0), 120, len(arms), len(arms[0].bones), 3)
+    free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
+    assert eased_turns(arms, rotations, STILL, free, rate=24.0, per_cycle=24.0) is None
+    assert eased_turns(arms, rotations, STILL, free, rate=24.0, per_cycle=60.0) is not None
