@@ -14,7 +14,7 @@ from .corrections import (
     raise_between_frames,
     separate_arms,
 )
-from .eased_turns import eased_turns
+from .eased_turns import eased_turns, largest_turns
 
 __all__ = [
     "DEEP",
@@ -28,6 +28,7 @@ __all__ = [
     "eased_turns",
     "joints_that_count",
     "keep_off_ground",
+    "largest_turns",
     "lead_past",
     "measure_overlap",
     "raise_between_frames",

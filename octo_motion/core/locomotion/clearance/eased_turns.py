@@ -42,6 +42,7 @@ def eased_turns(
     *,
     rate: float,
     per_cycle: float,
+    every: int = 1,
     cyclic: bool = False,
 ) -> tuple[Floats, Floats] | None:
     """Arms whose bones turn no faster than an eye can follow, wherever they are free to.
@@ -51,8 +52,9 @@ def eased_turns(
         rotations: (moments, bones, 4) of all arms, one after the other.
         orientations: (moments, 4) of the armature, world.
         held: for each arm (moments,) whether it is to stay as it is.
-        rate: moments per second …
+        rate: frames per second …
         per_cycle: … and in a cycle of the gait.
+        every: at every how many moments there is a frame.
         cyclic: whether the last moment is the first again.
 
     Returns:
@@ -66,9 +68,11 @@ def eased_turns(
         start = own.stop
         before = continuous(multiply(orientations[:, None], arm.from_bones(rotations[:, own])))
         round_again = cyclic and np.any(np.sum(before[-1] * before[0], axis=-1) < 0.0)
-        if not _faster(before, most).any() or round_again:
+        if not _faster(before, most, every).any() or round_again:
             continue
-        frames, share = _eased(before, held[number], most, rate=rate, cyclic=cyclic)
+        frames, share = _eased(
+            before, held[number], most, every=every, rate=every * rate, cyclic=cyclic
+        )
         if not share.any():
             continue
         if result is rotations:
@@ -81,7 +85,7 @@ def eased_turns(
 
 
 def _eased(
-    before: Floats, held: np.ndarray, most: float, *, rate: float, cyclic: bool
+    before: Floats, held: np.ndarray, most: float, *, every: int, rate: float, cyclic: bool
 ) -> tuple[Floats, Floats]:
     """Frames (moments, bones, 4) of an arm, world, with means where it is too fast, and how far
     these count (moments,).
@@ -92,7 +96,7 @@ def _eased(
     for part in _TRIED:
         width = max(1, round(part * _WIDEST * rate))
         near, torn = (
-            covered(_faster(frames, each).astype(np.float64), width, cyclic=cyclic)
+            covered(_faster(frames, each, every).astype(np.float64), width, cyclic=cyclic)
             for each in (most, _TORN * most)
         )
         share = np.maximum(near * loose, torn)
@@ -104,10 +108,30 @@ def _eased(
     return frames, whole
 
 
-def _faster(frames: Floats, most: float) -> np.ndarray:
-    """Moments (moments,) before and after a step in which some bone of frames (moments, bones, 4)
-    turns by more than so many radians.
+def largest_turns(
+    arms: Sequence[ArmFrames], rotations: Floats, orientations: Floats, every: int
+) -> Floats:
+    """Radians (arms,) by which some bone of each turns from a frame to the next at most."""
+    found, start = [], 0
+    for arm in arms:
+        own = slice(start, start + len(arm.bones))
+        start = own.stop
+        frames = multiply(orientations[:, None], arm.from_bones(rotations[:, own]))
+        found.append(_turns(frames, every).max(initial=0.0))
+    return np.array(found)
+
+
+def _faster(frames: Floats, most: float, every: int) -> np.ndarray:
+    """Moments (moments,) within a frame in which some bone of frames (moments, bones, 4) turns by
+    more than so many radians.
     """
-    same = np.abs(np.sum(frames[1:] * frames[:-1], axis=-1))
-    over = 2.0 * np.arccos(np.minimum(same, 1.0)).max(axis=1) > most
-    return np.append(over, False) | np.append(False, over)
+    over, result = _turns(frames, every) > most, np.zeros(len(frames), dtype=bool)
+    for step in range(every + 1):
+        result[step : step + len(over)] |= over
+    return result
+
+
+def _turns(frames: Floats, every: int) -> Floats:
+    """Radians (moments − every,) that the quickest of the bones turns within a frame."""
+    same = np.abs(np.sum(frames[every:] * frames[:-every], axis=-1))
+    return 2.0 * np.arccos(np.minimum(same, 1.0)).max(axis=1, initial=0.0)

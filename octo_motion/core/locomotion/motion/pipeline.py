@@ -21,6 +21,7 @@ from ..clearance import (
     Opened,
     eased_turns,
     keep_off_ground,
+    largest_turns,
     lead_past,
     raise_between_frames,
     separate_arms,
@@ -81,6 +82,8 @@ _EXACT_DISTANCE: Final = 0.002
 """… and arm lengths of an arm's tip."""
 _BONES_AT_ONCE: Final = 24_000
 """Bones times frames of one step of the work: some tens of megabytes."""
+_HELPED: Final = 0.85
+"""Share of the largest turn that is left, at most, where bones were given time."""
 _FLOOR_AROUND: Final = 2.5
 """Arm lengths to all sides of the body in which the floor is looked at …"""
 _FLOOR_FINE: Final = 0.02
@@ -419,17 +422,30 @@ def _take_time(
         for lying, late, own in zip(arms.in_contact, arms.late.T, busy.T, strict=True)
     ]
     frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
-    pace = {"rate": every * job.timing.rate, "per_cycle": every * plan.pace.fastest}
+    before, rate, per_cycle = arms.rotations, job.timing.rate, plan.pace.fastest
     for last in (False, False, True):
-        eased = eased_turns(frames, arms.rotations, going[1], held, **pace, cyclic=cyclic)
+        eased = eased_turns(
+            *(frames, arms.rotations, going[1], held),
+            rate=rate,
+            per_cycle=per_cycle,
+            every=every,
+            cyclic=cyclic,
+        )
         if eased is None:
-            return
+            break
         arms.rotations, changed = eased
         if ground is not None and not last:
             course = ArmsOverGround(frames, ground, creature.scale, cyclic=cyclic)
             poses = Poses(arms.rotations, arms.strains, *going)
             radii = [creature.scale * each for each in plan.standing[0].radii]
             arms.rotations = keep_off_ground(course, poses, radii, changed)
+    if arms.rotations is before:
+        return
+    # Where it is no help, it is no good either.
+    then, now = (largest_turns(frames, each, going[1], every) for each in (before, arms.rotations))
+    for arm in np.flatnonzero(now > _HELPED * then):
+        bones = plan.segments.bones_of[arm]
+        arms.rotations[:, bones] = before[:, bones]
 
 
 def _opened(plan: MotionPlan, count: int, swimming: Floats | None) -> Opened | None:
