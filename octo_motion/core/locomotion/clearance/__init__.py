@@ -14,7 +14,7 @@ from .corrections import (
     raise_between_frames,
     separate_arms,
 )
-from .eased_turns import eased_turns, largest_turns
+from .turn_easing import eased_turns, largest_turns
 
 __all__ = [
     "DEEP",
