@@ -52,6 +52,7 @@ def lay_out(folder: Path, wheels: list[str]) -> None:
     )
     shutil.copy(REPOSITORY / "blender_manifest.toml", folder)
     shutil.copy(REPOSITORY / "LICENSE", folder)
+    shutil.copy(REPOSITORY / "THIRD_PARTY.md", folder)
     (folder / "wheels").mkdir()
     for wheel in wheels:
         shutil.copy(fetch_wheel(wheel), folder / "wheels")
@@ -66,6 +67,12 @@ def packer() -> Path:
     return next(folder.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py"))
 
 
+def tags() -> tuple[str | Path, ...]:
+    """The option that names the tags that Blender's platform has."""
+    modules = packer().parents[3] / "modules"
+    return "--valid-tags", modules / "_bpy_internal" / "extensions" / "tags.py"
+
+
 def main(output: Path) -> None:
     manifest = tomllib.loads((REPOSITORY / "blender_manifest.toml").read_text(encoding="utf-8"))
     archive = output / f"{manifest['id']}-{manifest['version']}.zip"
@@ -77,7 +84,7 @@ def main(output: Path) -> None:
             *(sys.executable, packer(), "build"),
             *("--source-dir", folder, "--output-filepath", archive),
         )
-    run(sys.executable, packer(), "validate", archive)
+    run(sys.executable, packer(), "validate", archive, *tags())
     print(archive)
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The project's own files agree with each other, and its set-up scripts say what is wrong."""
 
+import importlib.util
 import os
 import re
 import shutil
@@ -82,6 +83,67 @@ def test_manifest_says_whose_work_it_carries_and_why_it_wants_its_permissions() 
         assert not reason.endswith(".")
     # Nothing but this computer is talked to, which Blender's switch for the network is not about.
     assert "this computer" in MANIFEST["permissions"]["network"]
+
+
+def validated(manifest: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """What Blender's own validator says of a manifest whose files are all there."""
+    specification = importlib.util.find_spec("bpy")
+    assert specification is not None
+    assert specification.origin is not None
+    (scripts,) = Path(specification.origin).parent.glob("*/scripts")
+    tool = scripts / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
+    tags = scripts / "modules" / "_bpy_internal" / "extensions" / "tags.py"
+    (folder / "wheels").mkdir(exist_ok=True)
+    for wheel in MANIFEST["wheels"]:
+        (folder / wheel).touch()
+    (folder / "__init__.py").touch()
+    (folder / "blender_manifest.toml").write_text(manifest, encoding="utf-8")
+    return subprocess.run(
+        [sys.executable, tool, "validate", folder, "--valid-tags", tags],
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
+    )
+
+
+def test_blenders_validator_takes_the_manifest(tmp_path: Path) -> None:
+    text = (REPOSITORY / "blender_manifest.toml").read_text(encoding="utf-8")
+    run = validated(text, tmp_path)
+    assert run.returncode == 0, run.stdout + run.stderr
+
+
+@pytest.mark.parametrize(
+    ("said", "wrong"),
+    [
+        ("on this computer alone", "on this computer alone."),
+        ('"2026 Octo', '"Octo'),
+        ("[permissions]", '[permissions]\nmind = "Read it"'),
+        ('website = "', 'website = "\\n'),
+        ('"Rigging"', '"Octopuses"'),
+    ],
+)
+def test_blenders_validator_refuses_what_the_platform_does(
+    tmp_path: Path, said: str, wrong: str
+) -> None:
+    text = (REPOSITORY / "blender_manifest.toml").read_text(encoding="utf-8")
+    assert said in text
+    assert validated(text.replace(said, wrong), tmp_path).returncode != 0
+
+
+def test_manifest_names_a_page_about_the_extension() -> None:
+    assert re.fullmatch(r"https://[a-z0-9.-]+\.[a-z]+/\S*", MANIFEST["website"])
+
+
+def test_libraries_in_the_wheels_are_named_with_their_terms() -> None:
+    text = (REPOSITORY / "THIRD_PARTY.md").read_text(encoding="utf-8")
+    version = pinned_version(SET_UP / "requirements-wheels.txt", "hidapi")
+    assert f"hidapi-{version}.tar.gz" in text
+    rows = [line.split("|") for line in text.splitlines() if line.startswith("| ")]
+    assert len(rows) == 10
+    for _, work, _within, _version, holders, licence, _ in rows[1:]:
+        assert work.strip()
+        assert re.search(r"\d{4} \w+|none is claimed", holders)
+        assert licence.strip()
 
 
 @needs_posix_shell

@@ -6,6 +6,9 @@ from __future__ import annotations
 import socket
 from typing import Final
 
+LOOPBACK: Final = "127.0.0.1"
+"""The one address that anything here listens at or talks to, this computer's own: Blender's
+*Allow Online Access* (``bpy.app.online_access``) is about the internet, and not asked for."""
 _MOST_BYTES: Final = 262_144
 """In one call: whoever sends without end does not keep a loop from going on."""
 

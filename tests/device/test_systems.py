@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -23,6 +24,7 @@ from tests.device.bridges import OPTIONS
 from tests.device.parts import found, wait_for
 
 OTHERS = ["win32", "darwin"]
+REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 # --- Starting ------------------------------------------------------------------------------------
@@ -96,6 +98,28 @@ def test_blender_without_a_console_hands_none_over(monkeypatch: pytest.MonkeyPat
     with pytest.raises(Started) as given:
         Child.start(["bridge"], Path(sys.executable))
     assert given.value.options["stderr"] == subprocess.DEVNULL
+
+
+@pytest.mark.parametrize("theirs", [None, "4"])
+def test_small_arrays_wait_for_no_threads_whatever_library_numpy_has(theirs: str | None) -> None:
+    """OpenBLAS, OpenMP, Intel's, and Accelerate of macOS; what somebody has set is left alone."""
+    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+    environment = {name: value for name, value in os.environ.items() if name not in names}
+    if theirs:
+        environment |= dict.fromkeys(names, theirs)
+    script = (
+        "import sys, octo_motion.device.__main__, os; assert 'numpy' not in sys.modules; "
+        f"print(*(os.environ.get(name) for name in {names}))"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=REPOSITORY,
+        env=environment,
+        capture_output=True,
+        encoding="utf-8",
+        check=True,
+    )
+    assert run.stdout.split() == [theirs or "1"] * 4
 
 
 # --- HID -----------------------------------------------------------------------------------------

@@ -40,11 +40,10 @@ from ..messages import (
     read_body,
     read_header,
 )
-from ..stream import Stream
+from ..stream import LOOPBACK, Stream
 
 log = logging.getLogger(__name__)
 
-HOST: Final = "127.0.0.1"
 _NONCE: Final = 32
 _CHALLENGE: Final = struct.Struct(f"<4sH{_NONCE}s")
 _ANSWER: Final = struct.Struct(f"<4sH{_NONCE}s32s")
@@ -155,7 +154,7 @@ class Listener:
     def __init__(self, secret: bytes) -> None:
         self._secret = secret
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        self._socket.bind((HOST, 0))
+        self._socket.bind((LOOPBACK, 0))
         self._socket.listen(4)
         self.port: int = self._socket.getsockname()[1]
 
@@ -198,7 +197,7 @@ def connect(port: int, secret: bytes) -> MessageChannel:
             secret.
     """
     try:
-        connection = socket.create_connection((HOST, port), timeout=_PATIENCE)
+        connection = socket.create_connection((LOOPBACK, port), timeout=_PATIENCE)
     except OSError as error:
         raise ChannelClosedError("nobody listens") from error
     try:

@@ -27,9 +27,9 @@ from ...core.errors import DeviceError
 from ...core.phrases import phrase
 from ...core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector, normalized, subtract
 from ..driver import Description, DeviceLostError, Driver, Dynamics, Kind, Sample, is_possible
+from ..stream import LOOPBACK
 from .websocket import WebSocket, WebSocketError, received_until
 
-HOST: Final = "127.0.0.1"
 PORT: Final = 10001
 OLDEST, TOO_NEW = (3, 1), (4, 0)
 _CONFIGURABLE: Final = (3, 5)
@@ -76,10 +76,10 @@ def service_version(port: int = PORT, seconds: float = 0.3) -> tuple[int, int] |
 
 def _answered_version(port: int, seconds: float) -> re.Match[str] | None:
     """The version that whoever listens at a port answers with."""
-    request = f"GET /version HTTP/1.1\r\nHost: {HOST}:{port}\r\nConnection: close\r\n\r\n"
+    request = f"GET /version HTTP/1.1\r\nHost: {LOOPBACK}:{port}\r\nConnection: close\r\n\r\n"
     end = time.monotonic() + seconds
     try:
-        with socket.create_connection((HOST, port), timeout=seconds) as connection:
+        with socket.create_connection((LOOPBACK, port), timeout=seconds) as connection:
             connection.sendall(request.encode())
             data = received_until(connection, b"", end)
         return parse_version(data)
@@ -147,7 +147,7 @@ class Haply(Driver):
         if version is None:
             return None
         try:
-            line = WebSocket.connect(HOST, port)
+            line = WebSocket.connect(LOOPBACK, port)
             end = time.monotonic() + _INVENTORY_SECONDS
             while not (came := line.receive()) and time.monotonic() < end:
                 time.sleep(0.002)

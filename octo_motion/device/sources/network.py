@@ -20,7 +20,7 @@ from typing import Final
 
 from ...core.rotations.scalars import ZERO, Vector
 from ..driver import Description, DeviceLostError, Driver, Kind, Sample, SentTimes, numbered_buttons
-from ..stream import Stream
+from ..stream import LOOPBACK, Stream
 from . import packets
 from .packets import KEY_BYTES, NetworkFeatures, Packet, PacketError
 
@@ -97,7 +97,7 @@ class Port:
         kind = socket.SOCK_STREAM if self._stream else socket.SOCK_DGRAM
         self._socket = socket.socket(socket.AF_INET, kind)
         self._socket.settimeout(0.0)
-        self._socket.bind(("127.0.0.1", self.number))
+        self._socket.bind((LOOPBACK, self.number))
         if self._stream:
             self._socket.listen(_WAITING)
         self.number = self._socket.getsockname()[1]
