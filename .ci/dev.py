@@ -189,10 +189,15 @@ def test(arguments: Sequence[str]) -> None:
             notes.append(f"Blender {version}: FAILED to set up")
             failed = True
     for version, python in list(pythons.items()):
-        if subprocess.run([python, ".ci/check_rendering.py"], cwd=ROOT, check=False).returncode:  # noqa: S603
+        if not subprocess.run([python, ".ci/check_rendering.py"], cwd=ROOT, check=False).returncode:  # noqa: S603
+            continue
+        if platform.system() == "Linux":
+            # What is missing can be installed, and without it the tests would end in a crash.
             notes.append(f"Blender {version}: FAILED")
             failed = True
             del pythons[version]
+        else:
+            notes.append(f"Blender {version}: nothing can be rendered here; such tests are skipped")
     ran = bool(pythons) or failed
     with tempfile.TemporaryFile() as log:
         running = {version: tests(pythons[version], arguments, log) for version in [*pythons][1:]}

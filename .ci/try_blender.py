@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Try the extension's zip in an official build of Blender: .ci/try_blender.py BLENDER ZIP.
 
-Installs it into an empty user folder, makes shots of a job in a folder whose name is not plain,
-from a file with the mark of Windows' editors; kills that half way and does it again; has a job with
-backslashes refused. Needs Python alone.
+Installs it into an empty user folder and takes the first walk; starts the bridge to devices, looks
+what it costs while nobody holds a hand, kills it, then Blender; makes shots of a job in a folder
+whose name is not plain, from a file with the mark of Windows' editors; kills that half way and does
+it again; has a job with backslashes refused. Needs Python alone. For ZIP, the folder that has it
+will do.
 """
 
 from __future__ import annotations
@@ -16,6 +18,9 @@ import tempfile
 import time
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+from tests.processes import alive, children_of, end, processor_seconds
+
 JOB = """\ufeff[defaults]
 output = "out/{name}.blend"
 octopus = { arms = 4, joints = 3 }
@@ -26,9 +31,38 @@ WALK = (
     "bpy.ops.octo_motion.add_route(); bpy.ops.octo_motion.generate_locomotion(); "
     "print('WALKED', octopus.animation_data.action.frame_range[1])"
 )
+BRIDGE = """
+import importlib, time
+name = "bl_ext.user_default.octo_motion.device.ipc.client"
+client = importlib.import_module(name).Client()
+def wait(what):
+    end = time.monotonic() + 60.0
+    while not what():
+        client.poll()
+        time.sleep(0.01)
+        assert time.monotonic() < end, (client.state, client.notices)
+client.start(("--simulate", "--no-haply"))
+wait(lambda: client.hello and client.devices)
+print("BRIDGE", client.hello.process, flush=True)
+wait(lambda: client.state.name == "LOST")
+client.restart()
+wait(lambda: client.state.name == "RUNNING" and client.devices)
+print("BACK", client.hello.process, flush=True)
+while True:
+    client.poll()
+    time.sleep(0.01)
+"""
+IDLE = 10.0
+"""s for which nobody holds the hand."""
+MOST = 0.4
+"""Share of one processor that each process of the bridge may take meanwhile."""
 
 
 def main(blender: str, archive: str) -> None:
+    blender = str(Path(blender).resolve())
+    if Path(archive).is_dir():
+        archive = str(max(Path(archive).glob("*.zip"), key=lambda path: path.stat().st_mtime))
+    archive = str(Path(archive).resolve())
     with tempfile.TemporaryDirectory(
         prefix="octo ~ Łódź é ", ignore_cleanup_errors=True
     ) as scratch:
@@ -58,6 +92,8 @@ def main(blender: str, archive: str) -> None:
         walked = run("--python-exit-code", "1", "--python-expr", WALK)
         expect("WALKED" in walked.stdout, "the first walk is there")
 
+        try_bridge([blender, "--background", "--python-expr", BRIDGE], environment)
+
         job = folder / "job.toml"
         shots = "".join(f'[[shots]]\nname = "s{number}"\n' for number in range(6))
         job.write_text(JOB + shots, encoding="utf-8")
@@ -84,10 +120,52 @@ def main(blender: str, archive: str) -> None:
         expect(bake(wrong) == 2, "backslashes are refused")
 
 
-def expect(holds: bool, what: str) -> None:  # noqa: FBT001 - a statement and whether it holds
+def try_bridge(command: list[str], environment: dict[str, str]) -> None:
+    """Start the bridge from a Blender, let it idle, kill it, kill Blender."""
+    process = subprocess.Popen(  # noqa: S603 - the Blender that is tried
+        command,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        encoding="utf-8",
+        errors="replace",
+    )
+
+    def told(what: str) -> int:
+        assert process.stdout is not None
+        for line in process.stdout:
+            print(line, end="", flush=True)
+            if line.startswith(f"{what} "):
+                return int(line.split()[1])
+        return expect(holds=False, what=f"Blender says {what}")
+
+    try:
+        bridge = told("BRIDGE")
+        started = children_of(process.pid)
+        expect(bridge in started and len(started) > 1, "the bridge and the loop at the devices run")
+        time.sleep(2.0)
+        before = {each: processor_seconds(each) for each in started}
+        time.sleep(IDLE)
+        shares = {each: (processor_seconds(each) - before[each]) / IDLE for each in started}
+        print(f"processors' time while idle: {shares}")
+        expect(max(shares.values()) < MOST, "what waits for a hand leaves the processor alone")
+        end(bridge)
+        expect(told("BACK") != bridge, "a bridge that was killed is told, and starts again")
+        started = children_of(process.pid)
+    finally:
+        process.kill()
+        process.wait()
+    latest = time.monotonic() + 20.0
+    while (left := [each for each in started if alive(each)]) and time.monotonic() < latest:
+        time.sleep(0.1)
+    expect(not left, "no process outlives a Blender that was killed")
+
+
+def expect(holds: bool, what: str) -> int:  # noqa: FBT001 - a statement and whether it holds
     print(f"{'ok' if holds else 'NOT SO'}: {what}", flush=True)
     if not holds:
         sys.exit(1)
+    return 0
 
 
 if __name__ == "__main__":

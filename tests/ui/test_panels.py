@@ -5,6 +5,8 @@ Blender draws panels in a window only. A layout of our own takes its place and c
 ones complain about on the console.
 """
 
+import platform
+import sys
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,6 +15,7 @@ from typing import Any
 import bpy
 import pytest
 
+from octo_motion.device.hid import system
 from octo_motion.ui import tool
 from octo_motion.ui.locomotion import panels
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
@@ -298,6 +301,34 @@ def test_of_a_linked_armature_the_tab_says_that_it_is_read_only(tmp_path: Path) 
     bpy.context.scene.collection.objects.link(linked)
     bpy.context.view_layer.objects.active = linked
     assert "Linked and read-only." in Tab()["rig"]
+
+
+def test_where_no_hidapi_is_made_the_panel_says_so_and_all_else_is_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Windows and Linux on ARM, Macs with Intel processors and Blender 5: there is no wheel."""
+
+    def drawn() -> list[str]:
+        system.why_not_read.cache_clear()
+        layout = Layout()
+        panel: Any = posing_panels.OCTO_MOTION_PT_posing_device
+        panel.show(SimpleNamespace(), layout, None)
+        return layout.drawn
+
+    monkeypatch.setattr(system, "hidapi", lambda: None)
+    usual = drawn()
+    monkeypatch.undo()
+    for name in ("hid", "hidraw"):
+        monkeypatch.setitem(sys.modules, name, None)
+    here = (sys.platform, platform.machine().lower())
+    monkeypatch.setattr(system, "_WITHOUT_WHEELS", {here})
+    lacking = drawn()
+    system.why_not_read.cache_clear()
+    assert " ".join(each for each in lacking if each not in usual) == (
+        "Devices cannot be read: hidapi is not made for computers like this one. All else works: "
+        "space mice that Blender has itself, and programs that are devices."
+    )
+    assert [each for each in lacking if each in usual] == usual
 
 
 @pytest.mark.parametrize(("width", "lines"), [(700, 1), (280, 3), (40, 6)])

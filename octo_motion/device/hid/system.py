@@ -127,11 +127,11 @@ _WITHOUT_WHEELS: Final = {
 
 @cache
 def why_not_read() -> str:
-    """Why no HID device can be read here, for people; empty where they can."""
+    """Why no HID device can be read here, and what to do; empty where they can."""
     try:
         hidapi()
     except DeviceError as error:
-        return error.problem
+        return str(error)
     return ""
 
 

@@ -14,7 +14,7 @@ from ...device.hid import why_not_read
 from ...device.messages import DeviceMessage
 from ..language import translated
 from ..operator_base import window_manager
-from ..panel_base import ArmaturePanel
+from ..panel_base import ArmaturePanel, draw_sentence
 from .device_hands import NDOF_NAME, DeviceHands, NdofHands
 from .device_pose import (
     Hands,
@@ -154,7 +154,7 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
         if hands is not None:
             self._devices(layout, hands)
         if why := why_not_read():
-            layout.label(text=translated(why), icon="INFO")
+            draw_sentence(layout, bpy.context, why, "INFO")
         for name in ("force", "toggle", "speed", "scale", "reach"):
             layout.prop(own, name)
         column = layout.column()
