@@ -111,7 +111,10 @@ def main(blender: str, archive: str) -> None:
         while any(".part" in each for each in names) and time.monotonic() < deadline:
             time.sleep(1.0)
             names = {path.name for path in (folder / "out").iterdir()}
-        expect(names == {f"s{number}.blend" for number in range(6)}, "and nothing else")
+        expect(
+            names == {f"s{number}.blend" for number in range(6)},
+            f"and nothing else: {sorted(names)}",
+        )
 
         wrong = folder / "wrong.toml"
         wrong.write_text(

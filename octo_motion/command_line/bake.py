@@ -459,7 +459,8 @@ class _Scratch(ExitStack):
         path = self._path(name, "request.json")
         Request(job.path, job.asked[name], self.places[name], plan.fingerprint).write(path)
         command = child_command(path, self.answer(name))
-        return Task(name, command, child_environment(self._folder), self.log(name))
+        answer = self.answer(name)
+        return Task(name, command, child_environment(self._folder), self.log(name), answer)
 
     def leave(self, name: str) -> None:
         """Delete what is left of a shot's unfinished outputs."""

@@ -45,12 +45,17 @@ _HEARTBEAT: Final = 0.5
 
 @dataclass(frozen=True)
 class Task:
-    """A process to run; what it says goes to its log."""
+    """A process to run; what it says goes to its log.
+
+    With an ``answer`` it counts as ended once that is written: such a process waits until its files
+    have been taken, for else a parent that ends in between would leave them to nobody.
+    """
 
     name: str
     command: list[str]
     environment: dict[str, str]
     log: Path
+    answer: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -84,26 +89,47 @@ def run_processes(
     an error or Ctrl-C, ends all processes.
     """
     waiting = iter(tasks)
-    running: dict[str, tuple[subprocess.Popen[bytes], float]] = {}
+    running: list[_Running] = []
     try:
         while True:
             while len(running) < most and (task := next(waiting, None)) is not None:
                 try:
-                    running[task.name] = _start(task), clock()
+                    running.append(_Running(task, _start(task), clock()))
                 except OSError as error:
                     task.log.write_text(f"{task.command[0]}: {error}", encoding="utf-8")
                     yield Ended(task.name, 127, 0.0)
             if not running:
                 return
-            ended = [name for name, (each, _) in running.items() if each.poll() is not None]
-            for name in ended:
-                process, started = running.pop(name)
-                _close(process)
-                yield Ended(name, process.returncode, clock() - started)
-            if not ended:
+            news = False
+            for each in list(running):
+                if each.process.poll() is not None:
+                    running.remove(each)
+                    _close(each.process)
+                elif not each.has_answered():
+                    continue
+                if not each.told:
+                    each.told = news = True
+                    yield Ended(
+                        each.task.name, each.process.returncode or 0, clock() - each.started
+                    )
+            if not news:
                 time.sleep(_GLANCE)
     finally:
-        _end([process for process, _ in running.values()])
+        _end([each.process for each in running])
+
+
+@dataclass
+class _Running:
+    """A process that was started, and whether its end has been told."""
+
+    task: Task
+    process: subprocess.Popen[bytes]
+    started: float
+    told: bool = False
+
+    def has_answered(self) -> bool:
+        """Whether it has said all that it has to say."""
+        return self.task.answer is not None and self.task.answer.exists()
 
 
 def _start(task: Task) -> subprocess.Popen[bytes]:
@@ -141,16 +167,17 @@ def _close(process: subprocess.Popen[bytes]) -> None:
 
 
 @contextlib.contextmanager
-def dying_with_parent(clean_up: Callable[[], None]) -> Iterator[None]:
+def dying_with_parent(clean_up: Callable[[], None]) -> Iterator[Callable[[], bool] | None]:
     """End this process as soon as the one that started it through ``run_processes`` is gone.
 
-    Whatever ends that one, its end of our standard input closes.
+    Whatever ends that one, its end of our standard input closes. What is handed out says whether
+    it is there; None where nobody started it so.
     """
     done = threading.Event()
     parent_is_there = _watched_pipe()
     if parent_is_there is None:
         # No pipe: then this process ends by itself.
-        yield
+        yield None
         return
 
     def watch() -> None:
@@ -162,7 +189,7 @@ def dying_with_parent(clean_up: Callable[[], None]) -> Iterator[None]:
     watcher = threading.Thread(target=watch, daemon=True)
     watcher.start()
     try:
-        yield
+        yield parent_is_there
     finally:
         # Blender 4.5 as a module hangs at exit while another thread of Python lives.
         done.set()
@@ -313,9 +340,15 @@ def run_shot(request: Path, answer: Path) -> int:
         # Requests, answers and logs of a run that is no more.
         shutil.rmtree(request.parent, ignore_errors=True)
 
-    with dying_with_parent(clean_up):
+    with dying_with_parent(clean_up) as parent_is_there:
         said = make_shot(asked)
-    write_json(answer, said)
+        write_json(answer, said)
+        while parent_is_there and any(place.exists() for place in asked.places.values()):
+            # Until they have been taken they are nobody's if the parent ends.
+            if not parent_is_there():
+                clean_up()
+                break
+            time.sleep(_GLANCE)
     return 1 if "error" in said else 0
 
 

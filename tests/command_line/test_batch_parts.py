@@ -338,6 +338,23 @@ def test_no_more_processes_run_at_a_time_than_asked_for(tmp_path: Path) -> None:
     assert seen[-1] == 4
 
 
+def test_process_that_has_answered_is_told_before_it_ends(tmp_path: Path) -> None:
+    """What it has made is taken while it is there to clean up, should nobody take it."""
+    made, answer = tmp_path / "made", tmp_path / "answer"
+    program = (
+        "import pathlib, time\n"
+        f"made, answer = pathlib.Path({str(made)!r}), pathlib.Path({str(answer)!r})\n"
+        "made.touch(); answer.touch()\n"
+        "while made.exists(): time.sleep(0.01)"
+    )
+    running = run_processes([replace(task("a", tmp_path, program), answer=answer)], 1)
+    ended = next(running)
+    assert (ended.name, ended.status) == ("a", 0)
+    assert made.exists()
+    made.unlink()
+    assert list(running) == []
+
+
 def test_processes_end_when_the_run_is_stopped(tmp_path: Path) -> None:
     held = "import sys; sys.stdin.read()"
     running = run_processes(

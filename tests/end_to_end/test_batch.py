@@ -7,6 +7,8 @@ import signal
 import socket
 import subprocess
 import sys
+import time
+import tomllib
 from collections.abc import Callable
 from contextlib import ExitStack, chdir, suppress
 from hashlib import sha256
@@ -17,7 +19,7 @@ import bpy
 import pytest
 
 from octo_motion import command_line
-from octo_motion.command_line import bake, commands
+from octo_motion.command_line import bake, commands, worker
 from octo_motion.core.errors import WriteError
 from tests.processes import has_console
 
@@ -412,6 +414,30 @@ def test_run_that_is_stopped_leaves_no_process_and_no_unfinished_file(
     else:
         assert status == 130
         assert {shot["error"] for shot in report(job).values()} == {"Stopped before it was done."}
+
+
+def test_shot_that_is_done_when_its_run_is_killed_leaves_nothing(tmp_path: Path) -> None:
+    """Its files have not taken their places, and nobody else knows of them."""
+    text = f'[[shots]]\nname = "a"\noutput = "a.blend"\n{SMALL}{ROUTE}{RANGE}'
+    job, place = write(tmp_path / "job.toml", text), tmp_path / ".a.part.blend"
+    (scratch := tmp_path / "scratch").mkdir()
+    (table,) = tomllib.loads(text)["shots"]
+    request = worker.Request(job, table, {tmp_path / "a.blend": place}, "")
+    request.write(scratch / "request.json")
+    answer = scratch / "answer.json"
+    with subprocess.Popen(
+        worker.child_command(scratch / "request.json", answer),
+        env=worker.child_environment(scratch),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+    ) as process:
+        while not answer.exists():
+            assert process.poll() is None
+            time.sleep(0.05)
+        assert "error" not in worker.read_answer(answer)
+        assert place.exists()
+        # Which is closed now, as by the end of whoever holds it.
+    assert names(tmp_path) == {"job.toml"}
 
 
 def test_report_that_cannot_be_written_any_more_stops_no_shot(

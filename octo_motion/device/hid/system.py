@@ -126,13 +126,13 @@ _WITHOUT_WHEELS: Final = {
 
 
 @cache
-def why_not_read() -> str:
-    """Why no HID device can be read here, and what to do; empty where they can."""
+def why_not_read() -> DeviceError | None:
+    """Why no HID device can be read here, and what to do; None where they can."""
     try:
         hidapi()
     except DeviceError as error:
-        return str(error)
-    return ""
+        return error
+    return None
 
 
 def list_devices() -> list[Found]:

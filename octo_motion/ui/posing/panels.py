@@ -154,7 +154,7 @@ class OCTO_MOTION_PT_posing_device(PosePanel, bpy.types.Panel):
         if hands is not None:
             self._devices(layout, hands)
         if why := why_not_read():
-            draw_sentence(layout, bpy.context, why, "INFO")
+            draw_sentence(layout, bpy.context, translated(why), "INFO")
         for name in ("force", "toggle", "speed", "scale", "reach"):
             layout.prop(own, name)
         column = layout.column()
