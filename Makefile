@@ -6,7 +6,7 @@
 # The Blender with a window that takes pictures of itself; options may follow it.
 BLENDER ?= blender
 
-.PHONY: help test lint demo bench referee test-farm build release pictures diagram window experiment papers setups clean
+.PHONY: help test lint demo bench referee test-farm build release pictures diagram window experiment papers setups texts clean
 
 help: ## list what can be made
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1|\2/p' Makefile | awk -F'|' '{printf "%-15s %s\n", $$1, $$2}'
@@ -52,6 +52,9 @@ papers: ## make the papers' experiments and figures again in build/papers; ARGS=
 
 setups: ## show every set-up on bumpy ground in build/setups; ARGS=--film for videos too
 	@.ci/dev setups $(ARGS)
+
+texts: ## print the texts that a language lacks, as a catalogue to fill in; ARGS=fr_FR
+	@.ci/dev texts $(ARGS)
 
 clean: ## delete what was built; delete .venv as well to set up anew
 	@.ci/dev clean

@@ -346,6 +346,11 @@ def setups(arguments: Sequence[str]) -> None:
     drawn("docs/studio/setups.py", arguments)
 
 
+def texts(arguments: Sequence[str]) -> None:
+    """Print the texts that a language lacks, fr_FR for example, as a catalogue to fill in."""
+    run(venv("bpy-5.2", "bpy-4.5"), "-m", "tests.texts", *arguments)
+
+
 def clean(_arguments: Sequence[str]) -> None:
     """Delete what was built; delete .venv as well to set up anew."""
     for name in ("build", "dist", ".ruff_cache", ".import_linter_cache"):
@@ -390,6 +395,7 @@ TASKS: dict[str, Callable[[Sequence[str]], None]] = {
     "experiment": experiment,
     "papers": papers,
     "setups": setups,
+    "texts": texts,
     "clean": clean,
     "venv": show_venv,
     "find-python": show_python,

@@ -15,7 +15,10 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 PAGES = [
-    *(REPOSITORY / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
+    *(
+        REPOSITORY / name
+        for name in ("README.md", "README.ja.md", "CONTRIBUTING.md", "CHANGELOG.md")
+    ),
     *sorted((REPOSITORY / "docs").glob("*.md")),
 ]
 SCRIPTING = REPOSITORY / "docs" / "scripting.md"
@@ -415,7 +418,7 @@ NOT_IN_THE_PANELS = (
     "An additive splice has no travel.",
     "It is not known which bones of … are arms and legs.",
     # Whose it is, or which line, before a problem that is explained.
-    *("…: …", "……."),
+    *("…: …", "….", "Line …: …."),
 )
 """Errors that scripts alone could meet."""
 
@@ -430,7 +433,9 @@ def message(node: ast.AST) -> str | None:
     """A text of the source with … for what is filled in."""
     match node:
         case ast.Constant(value=str(text)):
-            return text
+            return re.sub(r"'\{\w+\}'|\{\w+(![rs])?(:[^}]*)?\}", "…", text)
+        case ast.Call(func=ast.Name(id="phrase" | "as_phrase"), args=[text]):
+            return message(text)
         case ast.JoinedStr(values=parts):
             return "".join(
                 str(getattr(part, "value", "")) if isinstance(part, ast.Constant) else "…"

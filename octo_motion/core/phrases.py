@@ -9,8 +9,11 @@ text without anything filled in needs nothing of this: it is looked up as it is.
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Callable, Iterable
-from typing import Any, Self
+from string import Formatter
+from typing import Any, Final, Self
 
 Translate = Callable[[str], str]
 """From an English sentence, with placeholders or without, to the same in another language; what it
@@ -104,6 +107,53 @@ def told(text: object, translate: Translate) -> str:
     """
     plain = _plain(text)
     return plain.told(translate) if isinstance(plain, Phrase) else translate(str(plain))
+
+
+def packed(text: str) -> str:
+    """A text as JSON, for another process; of a phrase what it is made of."""
+    return json.dumps(_parts(text), ensure_ascii=False)
+
+
+def unpacked(text: str) -> str:
+    """What :func:`packed` has packed.
+
+    Raises:
+        ValueError: it is something else, or would fill in more than numbers and texts.
+    """
+    made = _of_parts(json.loads(text))
+    if not isinstance(made, str):
+        raise ValueError("a number")  # noqa: TRY004 - of the bytes that came, not of a caller
+    return made
+
+
+_PLACEHOLDER: Final = re.compile(r"\{\w*(?:![rs])?(?::,?\d?(?:\.\d)?[a-zA-Z%]?)?\}")
+_BRACES: Final = re.compile(r"\{\{|\}\}")
+
+
+def _parts(value: Any) -> Any:
+    if isinstance(value, Phrase):
+        values = {name: _parts(each) for name, each in value.values.items()}
+        return [value.template, values]
+    return value if isinstance(value, int | float) else str(value)
+
+
+def _of_parts(value: Any) -> Any:
+    match value:
+        case str() | int() | float():
+            return value
+        case [str(template), dict(values)] if _is_template(template, values):
+            return Phrase(template, {name: _of_parts(each) for name, each in values.items()})
+        case _:
+            raise ValueError("no text")
+
+
+def _is_template(template: str, values: dict[str, Any]) -> bool:
+    """Whether nothing but plain placeholders of these values stands in it."""
+    if not values:
+        return True
+    rest = _PLACEHOLDER.sub("", _BRACES.sub("", template))
+    named = {name for _, name, _, _ in Formatter().parse(template) if name is not None}
+    return not set("{}") & set(rest) and named <= values.keys()
 
 
 def _plain(value: Any) -> Any:

@@ -16,6 +16,8 @@ from typing import Any, Final, get_args, get_type_hints
 
 import numpy as np
 
+from ..core.phrases import packed, unpacked
+
 
 class MessageError(ValueError):
     """The bytes are no message of ours."""
@@ -81,6 +83,25 @@ class Text:
             return str(_take(data, length), "utf-8")
         except UnicodeDecodeError as error:
             raise MessageError("a text is not UTF-8") from error
+
+
+@dataclass(frozen=True)
+class Said(Text):
+    """A text for people, which may be a phrase: what it is made of."""
+
+    most: int = 4000
+
+    def put(self, value: Any, out: bytearray) -> None:
+        made = packed(value)
+        # Too long to go whole: the beginning of what it says.
+        super().put(made if len(made.encode()) <= self.most else packed(str(value)[:400]), out)
+
+    def take(self, data: BytesIO) -> str:
+        packed_text = super().take(data)
+        try:
+            return unpacked(packed_text)
+        except (ValueError, RecursionError) as error:
+            raise MessageError("a text for people is damaged") from error
 
 
 @dataclass(frozen=True)

@@ -34,12 +34,13 @@ from .codec import (
     MessageError,
     Number,
     Record,
+    Said,
     Table,
     Text,
 )
 from .driver import Axes
 
-VERSION: Final = 4
+VERSION: Final = 5
 MAGIC: Final = b"OMDV"
 HEADER: Final = struct.Struct("<4sHHI")
 MOST_BYTES: Final = 4_000_000
@@ -335,8 +336,8 @@ class Notice(Message):
     """Bridge to Blender: something for the user to read."""
 
     KIND = 13
-    problem: Annotated[str, Text(1000)]
-    remedy: Annotated[str, Text(1000)]
+    problem: Annotated[str, Said()]
+    remedy: Annotated[str, Said()]
 
 
 @dataclass(frozen=True)

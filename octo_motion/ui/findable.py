@@ -9,22 +9,23 @@ from typing import Any, ClassVar, Final, cast
 
 import bpy
 
+from ..core.phrases import phrase
 from ..core.splicing.clip import MOTION_SUFFIXES
 
 _ENTRIES: Final = (
-    ("generate_locomotion", "Generate Walk or Swim", "CON_FOLLOWPATH"),
-    ("detect_arms", "Detect Arms", "VIEWZOOM"),
-    ("add_route", "Add Route", "CURVE_BEZCURVE"),
+    ("generate_locomotion", phrase("Generate Walk or Swim"), "CON_FOLLOWPATH"),
+    ("detect_arms", phrase("Detect Arms"), "VIEWZOOM"),
+    ("add_route", phrase("Add Route"), "CURVE_BEZCURVE"),
     (),
-    ("import_clips", "Import Motion Clips…", "IMPORT"),
-    ("splice_add", "Add Splice", "ADD"),
-    ("splice_drag_timing", "Drag Timing of Splice", "ARROW_LEFTRIGHT"),
-    ("splice_build", "Build Splices", "NLA"),
-    ("retarget", "Retarget Clip", "ARMATURE_DATA"),
+    ("import_clips", phrase("Import Motion Clips…"), "IMPORT"),
+    ("splice_add", phrase("Add Splice"), "ADD"),
+    ("splice_drag_timing", phrase("Drag Timing of Splice"), "ARROW_LEFTRIGHT"),
+    ("splice_build", phrase("Build Splices"), "NLA"),
+    ("retarget", phrase("Retarget Clip"), "ARMATURE_DATA"),
     (),
-    ("pose_start", "Pose by Hand", "VIEW_PAN"),
-    ("pose_device", "Pose with Device", "ORIENTATION_GIMBAL"),
-    ("pose_script", "Play Pose Script…", "FILE_SCRIPT"),
+    ("pose_start", phrase("Pose by Hand"), "VIEW_PAN"),
+    ("pose_device", phrase("Pose with Device"), "ORIENTATION_GIMBAL"),
+    ("pose_script", phrase("Play Pose Script…"), "FILE_SCRIPT"),
 )
 """Operators, what they are called here, and their icons; nothing for a line between."""
 

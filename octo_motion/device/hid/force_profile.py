@@ -19,6 +19,7 @@ from math import isfinite
 from typing import Final
 
 from ...core.errors import DeviceError
+from ...core.phrases import phrase
 from ...core.rotations.scalars import ZERO, Vector, normalized
 from ..driver import (
     DeviceLostError,
@@ -299,8 +300,14 @@ class ForceDevice(HidDriver):
             handle.close()
             set_free()
             raise DeviceError(
-                f"{found.name or 'The force device'} does not follow the profile: {error}.",
-                f"Its firmware must follow version {VERSION} of the profile.",
+                phrase(
+                    "{name} does not follow the profile: {error}.",
+                    name=found.name or phrase("The force device"),
+                    error=error,
+                ),
+                phrase(
+                    "Its firmware must follow version {version} of the profile.", version=VERSION
+                ),
             ) from error
 
     def read(self) -> Sample | None:

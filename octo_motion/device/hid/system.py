@@ -233,19 +233,21 @@ def _claim_on_windows(found: Found) -> Callable[[], None]:
 
 def _in_use(found: Found) -> DeviceError:
     return DeviceError(
-        phrase("{name} is in use by another Blender.", name=found.name or "The device"),
+        phrase("{name} is in use by another Blender.", name=found.name or phrase("The device")),
         "End Pose with Device there.",
     )
 
 
 def _refusal(found: Found) -> DeviceError:
-    name = found.name or "The device"
+    name = found.name or phrase("The device")
     if sys.platform == "linux":
         path = Path(os.fsdecode(found.path))
         if path.exists() and not os.access(path, os.R_OK | os.W_OK):
             pushed = (found.page, found.usage) == MULTI_AXIS
             begin = (
-                "If Blender has it itself, just push it. Else, as root," if pushed else "As root,"
+                phrase("If Blender has it itself, just push it. Else, as root,")
+                if pushed
+                else phrase("As root,")
             )
             return DeviceError(
                 phrase(

@@ -179,7 +179,7 @@ class PoseControls:
     def _measure(self) -> str:
         body = self._pointed_at()
         if body is None:
-            return "Point at a limb to measure its joint"
+            return phrase("Point at a limb to measure its joint")
         self._lose()
         self.session.measure(body)
         return ""
@@ -352,7 +352,7 @@ class PoseControls:
         elif self.hover is not None:
             parts.append(phrase("{bone}", bone=session.bone(self.hover)))
         if session.recording:
-            parts.append("● Recording")
+            parts.append(phrase("● Recording"))
         report = session.report
         if report is not None and not report.resting and report.ratio < SLOW:
             parts.append(phrase("slower than real time: {ratio:.0f} %", ratio=100.0 * report.ratio))
@@ -371,8 +371,8 @@ class Undoable(Protocol):
 def undone(what: Undoable, *, forward: bool) -> str:
     """Take a step back or forward; what was done, in words."""
     if forward:
-        return "Forward" if what.step_forward() else "Nothing to bring back"
-    return "Back" if what.step_back() else "Nothing to take back"
+        return phrase("Forward") if what.step_forward() else phrase("Nothing to bring back")
+    return phrase("Back") if what.step_back() else phrase("Nothing to take back")
 
 
 def _modified(event: Any) -> bool:

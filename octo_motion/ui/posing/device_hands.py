@@ -46,8 +46,8 @@ RATE_WIDTH: Final = 1.0
 """m: full push of a space mouse crosses the view in 2.5 s."""
 _ANSWER: Final = 0.4
 """s after which a grab that holds nothing has found nothing."""
-NOTHING_NEAR: Final = "No limb is near enough to grab"
-NDOF_NAME: Final = "Space mouse, through Blender"
+NOTHING_NEAR: Final = phrase("No limb is near enough to grab")
+NDOF_NAME: Final = phrase("Space mouse, through Blender")
 NDOF_GRAB_BUTTONS: Final = frozenset({"NDOF_BUTTON_MENU", "NDOF_BUTTON_1", "NDOF_BUTTON_V1"})
 NDOF_KEY_BUTTONS: Final = frozenset({"NDOF_BUTTON_FIT", "NDOF_BUTTON_2", "NDOF_BUTTON_V2"})
 _LONGEST: Final = 0.1

@@ -270,14 +270,14 @@ def line(hands: Hands) -> str:
         parts.append(phrase("The device's program {trouble}: B starts it again", trouble=trouble))
     elif not shown:
         is_blenders = isinstance(hands, NdofHands)
-        parts.append(NDOF_NAME if is_blenders else "No device yet: plug one in")
+        parts.append(NDOF_NAME if is_blenders else phrase("No device yet: plug one in"))
     for each in shown:
         what = hands.session.bone(each.body) if each.body >= 0 else phrase("free")
         if each.number in hands.client.calibrating:
             what = phrase("is being calibrated")
         parts.append(phrase("{device}: {what}", device=each.name, what=what))
     if hands.session.recording:
-        parts.append("● Recording")
+        parts.append(phrase("● Recording"))
     if hands.message:
         parts.append(hands.message)
     return joined_phrases("    ", parts)

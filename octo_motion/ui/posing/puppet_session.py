@@ -327,8 +327,8 @@ class KeyedPuppet(PosedPuppet):
                 return joined_phrases("", (told, over))
             return told
         if self.core.touched():
-            return "Nothing keyed: by the settings of keying, no bone needs or takes a key"
-        return "Nothing to key: no bone was moved"
+            return phrase("Nothing keyed: by the settings of keying, no bone needs or takes a key")
+        return phrase("Nothing to key: no bone was moved")
 
     def settle(self) -> None:
         """Let the bones show the pose that the figure has."""
@@ -484,7 +484,7 @@ class PuppetSession(KeyedPuppet):
                 frames=_key_frames(frames),
             )
         self.record()
-        return "Recording while the frames go by: play, and drag"
+        return phrase("Recording while the frames go by: play, and drag")
 
     def record(self) -> None:
         """Begin to keep the pose at each frame, from this one on.

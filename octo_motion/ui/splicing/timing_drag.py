@@ -175,7 +175,7 @@ class DragSession:
 # --- The operator ---------------------------------------------------------------------------------
 
 
-_HELP: Final = (
+_HELP: Final = phrase(
     "Drag: move    Shift: fine    Tab: base or clip    Numbers: type a frame    "
     "Arrow keys, Space: other frames    Enter, click: build    Esc, right click: as it was"
 )

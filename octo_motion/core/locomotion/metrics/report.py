@@ -99,10 +99,12 @@ TOLD: Final = {
 _BREAKS: Final = {"DEPTH": 0.05, "TURN": np.radians(60.0)}
 """From where on the motion is broken there."""
 _SAID: Final = {
-    "SLIP": "'{arm}' slips by {percent:.1f} % of its length at frame {frame}",
-    "DRIFT": "'{arm}' drifts by {percent:.1f} % of its length while it rests, at frame {frame}",
-    "DEPTH": "'{arm}' is {percent:.1f} % of its length below the ground at frame {frame}",
-    "TURN": "'{arm}' turns by {degrees:.0f}° at frame {frame}",
+    "SLIP": phrase("'{arm}' slips by {percent:.1f} % of its length at frame {frame}"),
+    "DRIFT": phrase(
+        "'{arm}' drifts by {percent:.1f} % of its length while it rests, at frame {frame}"
+    ),
+    "DEPTH": phrase("'{arm}' is {percent:.1f} % of its length below the ground at frame {frame}"),
+    "TURN": phrase("'{arm}' turns by {degrees:.0f}° at frame {frame}"),
 }
 """How what is too bad is told; misses and overlaps have sentences of their own."""
 _WAYS: Final = np.concatenate([np.geomspace(1.0 / 64.0, 1.0 / 8.0, 7), np.arange(2, 9) / 8.0])

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from ...errors import SettingsError
-from ...phrases import as_phrase, phrase
+from ...phrases import phrase
 from ...rotations import Floats
 from ..gait import diameters
 
@@ -46,12 +46,12 @@ class OctopusShape:
     0 keeps to the diameters of the joints, 1 ends in a point."""
 
     def __post_init__(self) -> None:
-        _check_range("Arms", self.arms, *ARMS)
-        _check_range("Joints per arm", self.joints, *JOINTS)
-        _check_range("Taper", self.taper, 0.0, 1.0)
-        _check_range("Mesh taper", self.mesh_taper, 0.0, 1.0)
-        _check_size("Arm length", self.arm_length)
-        _check_size("First diameter", self.first_diameter)
+        _check_range(phrase("Arms"), self.arms, *ARMS)
+        _check_range(phrase("Joints per arm"), self.joints, *JOINTS)
+        _check_range(phrase("Taper"), self.taper, 0.0, 1.0)
+        _check_range(phrase("Mesh taper"), self.mesh_taper, 0.0, 1.0)
+        _check_size(phrase("Arm length"), self.arm_length)
+        _check_size(phrase("First diameter"), self.first_diameter)
         shortest = float(np.min(self.segments))
         if shortest < _SHORTEST_BONE:
             raise SettingsError(
@@ -113,7 +113,7 @@ class OctopusShape:
 def _check_range(label: str, value: float, lowest: float, highest: float) -> None:
     if not lowest <= value <= highest:
         raise SettingsError(
-            phrase("{label} is {value:g}.", label=as_phrase(label), value=value),
+            phrase("{label} is {value:g}.", label=label, value=value),
             phrase(
                 "Choose a value from {lowest:g} to {highest:g}.", lowest=lowest, highest=highest
             ),
@@ -123,7 +123,7 @@ def _check_range(label: str, value: float, lowest: float, highest: float) -> Non
 def _check_size(label: str, value: float) -> None:
     if not (value > 0.0 and math.isfinite(value)):
         raise SettingsError(
-            phrase("{label} is {value:g}.", label=as_phrase(label), value=value),
+            phrase("{label} is {value:g}.", label=label, value=value),
             "Choose a length greater than zero.",
         )
 

@@ -414,8 +414,9 @@ def _points(points: ArrayLike) -> Floats:
     array = np.asarray(points, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != 3 or len(array) < 2:
         count = len(array) if array.ndim == 2 else 0
-        points = phrase("1 point") if count == 1 else phrase("{count} points", count=count)
-        raise RouteError(phrase("The route has {points}.", points=points), _NOWHERE)
+        if count == 0:
+            raise RouteError("The route has no points.", _NOWHERE)
+        raise RouteError(phrase("The route has {count} point.", count=count), _NOWHERE)
     _check_numbers(array)
     return array
 

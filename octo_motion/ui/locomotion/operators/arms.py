@@ -323,9 +323,9 @@ def _summary(arms: Sequence[ArmChain]) -> str:
     counts = {
         told: sum(arm.side == side for arm in arms)
         for side, told in (
-            ("LEFT", "{count} left"),
-            ("RIGHT", "{count} right"),
-            ("CENTER", "{count} in the middle"),
+            ("LEFT", phrase("{count} left")),
+            ("RIGHT", phrase("{count} right")),
+            ("CENTER", phrase("{count} in the middle")),
         )
     }
     told = joined_phrases(

@@ -136,10 +136,10 @@ def _take_away(context: bpy.types.Context, armature: bpy.types.Object) -> None:
 def draw_rest(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
     """Whether the creature stands at the ends of its way."""
     ground = settings.ground
-    column = layout.column(heading="Rest")
+    column = layout.column(heading=translated("Rest"))
     for name, text, ease in (
-        ("start_at_rest", "At Start", settings.ease_in),
-        ("come_to_rest", "At End", settings.ease_out),
+        ("start_at_rest", phrase("At Start"), settings.ease_in),
+        ("come_to_rest", phrase("At End"), settings.ease_out),
     ):
         row = column.row()
         row.active = ease > 0.0

@@ -489,7 +489,7 @@ def _draw_knots(
     angle = table.shown_angle.lower()
     column = layout.column(align=True)
     row = column.row(align=True)
-    for title in ("Phase", "Root", "Middle", "Tip"):
+    for title in (phrase("Phase"), phrase("Root"), phrase("Middle"), phrase("Tip")):
         row.label(text=title)
     row.label(text="", icon="BLANK1")
     for number, knot in enumerate(used(curve.knots)):
