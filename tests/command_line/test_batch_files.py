@@ -6,15 +6,18 @@ from __future__ import annotations
 import io
 import json
 import os
+import signal
 import sys
+import tempfile
 import time
 import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from octo_motion.command_line import worker
+from octo_motion.command_line import bake, stopping, worker
 from octo_motion.command_line.command_line import parse
 from octo_motion.command_line.job import JobError, read_job
 from octo_motion.command_line.job_report import ShotRecord, write_report
@@ -204,6 +207,38 @@ def test_path_that_is_too_long_for_windows_is_told_so(
         staged([path]),
     ):
         pass
+
+
+def test_log_that_a_scanner_holds_stops_no_run_at_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An hour's work is done, and its folder for temporary files cannot be deleted."""
+
+    def processes(_tasks: object, _jobs: int) -> Iterator[worker.Ended]:
+        (folder,) = tmp_path.glob("octo-motion-*")
+        (folder / "0-log.txt").touch()
+        yield from ()
+
+    def refuse(*_arguments: object, **_options: object) -> None:
+        raise PermissionError(13, "The process cannot access the file")
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(bake, "run_processes", processes)
+    job: Any = None
+    run = bake._Run(job, job, job)
+    with monkeypatch.context() as held:
+        held.setattr(os, "unlink", refuse)
+        run._bake([], {}, 1)
+    assert [path.name for path in tmp_path.rglob("*.txt")] == ["0-log.txt"]
+
+
+def test_ctrl_break_stops_a_run_on_windows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    before = set(stopping._stop_signals())
+    monkeypatch.setattr(sys, "platform", "win32")
+    monkeypatch.setattr(signal, "SIGBREAK", 21, raising=False)
+    assert set(stopping._stop_signals()) == {*before, 21}
 
 
 # --- What consoles can show ----------------------------------------------------------------------
