@@ -134,7 +134,8 @@ def troubles(cluster: Slurm, folder: Path) -> list[str]:
     """20 shots: a node daemon killed, a task put back by hand, a task over its time."""
     job, program = jobs.make_job(folder, 20), jobs.blender(folder)
     (folder / "slow").touch()  # the first start sleeps: it will be over its time
-    number = cluster.submit(job, program, 20, 1, "--time=1")
+    # Of two minutes a task has one and a half: enough for a shot where others work as well.
+    number = cluster.submit(job, program, 20, 1, "--time=2")
     (starts := folder / "starts").touch()
 
     def trouble() -> Iterator[None]:
