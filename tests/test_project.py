@@ -130,6 +130,11 @@ def test_blenders_validator_refuses_what_the_platform_does(
     assert validated(text.replace(said, wrong), tmp_path).returncode != 0
 
 
+def test_changelog_begins_with_the_version_of_the_manifest() -> None:
+    text = (REPOSITORY / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert re.findall(r"^## (\S+)", text, re.MULTILINE)[0] == MANIFEST["version"]
+
+
 def test_manifest_names_a_page_about_the_extension() -> None:
     assert re.fullmatch(r"https://[a-z0-9.-]+\.[a-z]+/\S*", MANIFEST["website"])
 

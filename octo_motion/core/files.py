@@ -85,4 +85,6 @@ def plain_name(name: str) -> str:
     plain = _ODD.sub("_", name)
     if DEVICES.match(plain):
         plain = f"{plain[:3]}_{plain[3:]}"
-    return plain if len(plain.encode()) <= LONGEST_PART else plain[: LONGEST_PART // 4]
+    if len(plain.encode()) <= LONGEST_PART:
+        return plain
+    return _ODD.sub("_", plain[: LONGEST_PART // 4])

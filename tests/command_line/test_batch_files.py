@@ -87,7 +87,20 @@ def test_backslashes_are_told_where_they_are_no_folders(
 
 
 @pytest.mark.parametrize(
-    "name", ["a:b", "aux", "NUL", "con.old", "com1", "lpt\u00b9", "what?", "a.", "a ", "x" * 201]
+    "name",
+    [
+        "a:b",
+        "aux",
+        "NUL",
+        "con.old",
+        "com1",
+        "lpt\u00b9",
+        "what?",
+        "a.",
+        "a ",
+        "x" * 201,
+        "x" * 49 + ".y" * 90,
+    ],
 )
 def test_name_that_some_system_cannot_take_is_refused_on_each(tmp_path: Path, name: str) -> None:
     assert name_fault(name)
