@@ -12,6 +12,7 @@ from .correspondence import (
     same_build,
 )
 from .counterparts import mirror_images, opposite
+from .fingers import palm_directions, palm_roots
 from .landmarks import (
     LANDMARKS,
     MIDDLE,
@@ -50,6 +51,8 @@ __all__ = [
     "mirrored",
     "new_mapping",
     "opposite",
+    "palm_directions",
+    "palm_roots",
     "recognised",
     "rest_alike",
     "same_build",

@@ -15,7 +15,7 @@ well as arms spread.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -32,6 +32,7 @@ from ...rotations import (
     shortest_arc,
 )
 from ...skeleton import Skeleton
+from .fingers import finger_bones
 from .landmarks import LANDMARKS, Landmarks
 
 _SAME: Final = 0.005
@@ -106,7 +107,9 @@ def matched_bones(
     splice_bones: Sequence[int],
     landmarks: tuple[Landmarks | None, Landmarks | None],
 ) -> dict[int, int]:
-    """Splice bone by base bone: landmarks first, then names, without prefix and case."""
+    """Splice bone by base bone: landmarks first, then names, without prefix and case, then fingers
+    whatever they are called.
+    """
     inside, theirs = set(bones), set(splice_bones)
     pairs = {
         bone: answer
@@ -118,7 +121,25 @@ def matched_bones(
     for bone in bones:
         if bone not in pairs and _plain(base.names[bone]) in by_name:
             pairs[bone] = by_name.pop(_plain(base.names[bone]))
+    taken = set(pairs.values())
+    for bone, answer in _finger_pairs(base, splice, landmarks):
+        if bone in inside - pairs.keys() and answer in theirs - taken:
+            pairs[bone] = answer
     return pairs
+
+
+def _finger_pairs(
+    base: Skeleton, splice: Skeleton, landmarks: tuple[Landmarks | None, Landmarks | None]
+) -> Iterator[tuple[int, int]]:
+    """Bones of the same finger of the same hand, counted from the palm."""
+    for name in ("hand.L", "hand.R"):
+        hands = [
+            skeleton.index.get((marks.get(name) if marks is not None else None) or "", -1)
+            for skeleton, marks in zip((base, splice), landmarks, strict=True)
+        ]
+        if min(hands) >= 0:
+            ours, theirs = finger_bones(base, hands[0]), finger_bones(splice, hands[1])
+            yield from ((bone, theirs[key]) for key, bone in ours.items() if key in theirs)
 
 
 def matched_chains(

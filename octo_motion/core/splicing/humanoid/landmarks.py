@@ -167,7 +167,7 @@ class BoneName:
 
 def read_names(names: Sequence[str]) -> tuple[BoneName, ...]:
     """What each of a rig's bone names says."""
-    words = [_words(name) for name in names]
+    words = [words_of(name) for name in names]
     counts = Counter(word for each in words for word in set(each))
     # What most bones have in their names is the name of the character.
     common = {
@@ -199,7 +199,8 @@ def _known(word: str) -> bool:
     return word in _MEANINGS or word in _NO_PART
 
 
-def _words(name: str) -> tuple[str, ...]:
+def words_of(name: str) -> tuple[str, ...]:
+    """The words of a bone's name, in small letters, without a namespace; numbers are words."""
     plain = unicodedata.normalize("NFKC", name).translate(_HIRAGANA)
     plain = _NAMESPACE.sub("", plain)
     found: list[str] = []

@@ -67,14 +67,31 @@ def map_skeleton(skeleton: Skeleton, in_motion: Skeleton | None = None) -> Skele
     Args:
         skeleton: as it rests.
         in_motion: the same bones as they lie in a motion, if there is one. A rest pose may be no
-            pose of a body (all bones along one axis); where it leaves something open, and this
-            tells more, this counts.
+            pose of a body (all bones along one axis): then this counts, if it tells as much, and
+            where a rest pose leaves something open, and this tells more.
     """
     found = _map_at_rest(skeleton)
-    if in_motion is None or not (found.asked or found.problem):
+    if in_motion is None:
+        return found
+    whole = not (found.asked or found.problem)
+    if whole and _rests_as_a_body(skeleton, found.landmarks):
         return found
     other = _map_at_rest(in_motion)
-    return other if len(other.landmarks.bones) > len(found.landmarks.bones) else found
+    more = len(other.landmarks.bones) - len(found.landmarks.bones)
+    return other if more > 0 or (whole and more == 0) else found
+
+
+def _rests_as_a_body(skeleton: Skeleton, landmarks: Landmarks) -> bool:
+    """Whether both legs lead the same way, away from the head: sitting people rest so, too."""
+    places = {name: skeleton.heads[skeleton.index[bone]] for name, bone in landmarks.bones.items()}
+    up = places["head"] - places["hips"]
+    legs = [places[f"foot.{side}"] - places[f"thigh.{side}"] for side in "LR"]
+    lengths = [float(np.linalg.norm(each)) for each in (up, *legs)]
+    alike = float(legs[0] @ legs[1]) > 0.5 * lengths[1] * lengths[2]
+    return alike and all(
+        float(leg @ up) < 0.5 * length * lengths[0]
+        for leg, length in zip(legs, lengths[1:], strict=True)
+    )
 
 
 def _map_at_rest(skeleton: Skeleton) -> SkeletonMapping:

@@ -430,13 +430,12 @@ def _end_of_middle(
 def _goes_up(skeleton: Skeleton, bone: int, up: Floats) -> bool:
     """Whether a bone leads on: jaw and hair turn back."""
     children = skeleton.children[bone]
-    if children:
-        way = skeleton.heads[list(children)].mean(axis=0) - skeleton.heads[bone]
-    elif points_to_its_end(skeleton, skeleton.parents[bone], bone):
-        way = skeleton.rest_matrices[bone][:3, 1]
-    else:
+    if points_to_its_end(skeleton, skeleton.parents[bone], bone):
+        return float(skeleton.rest_matrices[bone][:3, 1] @ up) > 0.0
+    if not children:
         return True
-    return float(way @ up) > 0.0
+    way = skeleton.heads[list(children)].mean(axis=0) - skeleton.heads[bone]
+    return float(way @ up) >= 0.0
 
 
 def points_to_its_end(skeleton: Skeleton, bone: int, child: int) -> bool:

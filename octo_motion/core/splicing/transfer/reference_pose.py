@@ -37,7 +37,7 @@ from ...rotations import (
 )
 from ...smoothing import smooth_step
 from ..clip import Clip, robust_direction, robust_rotations
-from ..humanoid import Landmarks
+from ..humanoid import Landmarks, palm_directions, palm_roots
 from .parts import spoken
 
 _SAMPLES: Final = 240
@@ -86,7 +86,7 @@ from right, and where they tell it alone."""
 _SQUARE: Final = float(np.cos(np.radians(20.0)))
 """Cosine of the angle by which their line may be off that of the shoulders."""
 
-_X, _Z = np.eye(3)[[0, 2]]
+_X, _Y, _Z = np.eye(3)
 _LIMBS: Final = (
     # root, middle and end; what they are seen from; where they hang, where they rest, and the axis
     # about which they bend as they hang: a body that faces −Y, a side that is +1 on the left.
@@ -117,20 +117,29 @@ def has_fingers(clip: Clip, landmarks: Landmarks) -> bool:
     return any(hand >= 0 and skeleton.children[hand] for hand in hands)
 
 
+def has_palms(clip: Clip, landmarks: Landmarks) -> bool:
+    """Whether the roots of fingers tell how both palms lie."""
+    skeleton = clip.skeleton
+    hands = [skeleton.index.get(landmarks.get(f"hand.{side}") or "", -1) for side in "LR"]
+    return all(hand >= 0 and palm_roots(skeleton, hand) is not None for hand in hands)
+
+
 def find_reference_pose(
-    clip: Clip, landmarks: Landmarks, *, fingers: bool = True
+    clip: Clip, landmarks: Landmarks, *, fingers: bool = True, palms: bool = False
 ) -> ReferencePose | None:
     """The reference pose of a clip; none where a landmark that it needs is missing.
 
     Fingers are joints: where they come to lie no rest pose may change. If neither of two bodies has
-    any (``fingers``), forearms and hands are as they rest, where that is a pose of this body.
+    any (``fingers``), forearms and hands are as they rest, where that is a pose of this body. If
+    both tell how their palms lie (``palms``), these face down, with the thumb in front.
     """
     if not len(clip) or not {
         *("hips", "chest", "thigh.L", "thigh.R", "upper_arm.L", "upper_arm.R")
     } <= {name for name, bone in landmarks.bones.items() if bone in clip.skeleton.index}:
         return None
     try:
-        return _Finder(_told_by(clip, landmarks), landmarks).pose(fingers=fingers)
+        finder = _Finder(_told_by(clip, landmarks), landmarks)
+        return finder.pose(fingers=fingers, palms=palms)
     except _NoFrameError:
         return None
 
@@ -184,7 +193,7 @@ class _Finder:
         self._bones = {name: index[bone] for name, bone in landmarks.bones.items() if bone in index}
         self._standing = self._how_standing()
 
-    def pose(self, *, fingers: bool) -> ReferencePose:
+    def pose(self, *, fingers: bool, palms: bool) -> ReferencePose:
         """The whole."""
         made: dict[int, Floats] = {}
         hips, chest = self._bones["hips"], self._bones["chest"]
@@ -200,6 +209,8 @@ class _Finder:
                     made |= self._limb([self._bones[each] for each in names], frame, bends, goal)
         if not fingers:
             made |= self._arms_at_rest(made)
+        if palms:
+            made |= self._palms_down()
         self._means(made, hips, chest)
         orientations = np.array([made[bone] for bone in range(len(self._skeleton))])
         return ReferencePose(orientations, self._fixed())
@@ -392,6 +403,24 @@ class _Finder:
                 way = normalized(rotate(lay, heads[lower] - heads[upper]))
                 lay = multiply(shortest_arc(way, goal), lay)
             found[middle], found[end] = multiply(lay, rests[middle]), multiply(lay, rests[end])
+        return found
+
+    def _palms_down(self) -> dict[int, Floats]:
+        """Hands whose palms are told by the roots of their fingers."""
+        found = {}
+        for side, goal in (("L", _X), ("R", -_X)):
+            hand = self._bones.get(f"hand.{side}", -1)
+            roots = palm_roots(self._skeleton, hand) if hand >= 0 else None
+            if roots is None:
+                continue
+            ways = palm_directions(self._heads, hand, roots)
+            along, across = (
+                robust_direction(self._seen(hand, way), np.ones(len(way))) for way in ways
+            )
+            # From index to little finger is backwards.
+            rest = from_matrix(np.stack([goal, _Y, np.cross(goal, _Y)], axis=-1))
+            own = _axes(along, across, first_and_second=True)
+            found[hand] = multiply(rest, conjugate(own))
         return found
 
     def _rests_in_a_pose(self, made: dict[int, Floats]) -> bool:

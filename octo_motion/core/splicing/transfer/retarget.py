@@ -50,7 +50,7 @@ from .parts import (
     landmark_bone,
     sided,
 )
-from .reference_pose import ReferencePose, find_reference_pose, has_fingers, standing_up
+from .reference_pose import ReferencePose, find_reference_pose, has_fingers, has_palms, standing_up
 from .upright import Body, body_of, facing, stand_over
 
 _HINGE_SAMPLES = 200
@@ -69,11 +69,11 @@ class MappedClip:
         """The pose in which the skeleton rests, if it is its reference pose."""
         return None
 
-    def in_reference_pose(self, *, fingers: bool = True) -> MappedClip:
+    def in_reference_pose(self, *, fingers: bool = True, palms: bool = False) -> MappedClip:
         """The clip with its reference pose as its rest pose; itself where none can be found."""
         if self.landmarks is None:
             return self
-        found = find_reference_pose(self.clip, self.landmarks, fingers=fingers)
+        found = find_reference_pose(self.clip, self.landmarks, fingers=fingers, palms=palms)
         if found is None:
             return self
         rests = Reresting(self.skeleton, with_rest_pose(self.skeleton, found.orientations))
@@ -152,7 +152,12 @@ def compared(base: MappedClip, splice: MappedClip) -> tuple[MappedClip, MappedCl
     fingers = any(
         has_fingers(each.clip, known) for each, known in zip((base, splice), marks, strict=True)
     )
-    referred = tuple(each.in_reference_pose(fingers=fingers) for each in (base, splice))
+    palms = all(
+        has_palms(each.clip, known) for each, known in zip((base, splice), marks, strict=True)
+    )
+    referred = tuple(
+        each.in_reference_pose(fingers=fingers, palms=palms) for each in (base, splice)
+    )
     if any(each.reference is None for each in referred):
         return base, splice
     return referred[0], referred[1]

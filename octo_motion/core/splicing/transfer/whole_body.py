@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from ...rotations import (
+    IDENTITY,
     Floats,
     from_matrix,
     multiply,
@@ -144,7 +145,7 @@ def _on_whole_limbs(
 ) -> Clip:
     ours, theirs = compared(base, source)
     rests = ours.rests if isinstance(ours, ReferredClip) else None
-    before = still if rests is None else rests.into(still)
+    at_rest = before = still if rests is None else rests.into(still)
     retargets = [
         each
         for name in _PARTS
@@ -152,9 +153,26 @@ def _on_whole_limbs(
             PARTS[name], ours, theirs, clavicle=True, seen_from="pelvis" if name == "legs" else ""
         )
     ]
+    if rests is not None and not rests_standing(base.skeleton, base.landmarks):
+        before = _with_carriers_in_place(before, ours, retargets)
     mover = _Mover((ours, theirs), retargets, settings, stands)
     result = mover.onto(before)
-    return result if rests is None else rests.back(result, before, still)
+    return result if rests is None else rests.back(result, at_rest, still)
+
+
+def _with_carriers_in_place(still: Clip, body: MappedClip, retargets: list[Retarget]) -> Clip:
+    """A body that does nothing, with bones that carry limbs and that no part takes as they are in
+    the reference pose: where a file's rest pose is none of a body, they would put limbs anywhere.
+    """
+    skeleton, marks = still.skeleton, body.humanoid()
+    hips = body.bone("hips")
+    taken = {bone for each in retargets for bone in each.bones}
+    ends = [bone for name in marks.bones if (bone := skeleton.index.get(marks[name])) is not None]
+    carriers = {bone for end in ends for bone in skeleton.ancestors(end)}
+    carriers = {bone for bone in carriers - taken if hips in skeleton.ancestors(bone)}
+    rotations = still.rotations.copy()
+    rotations[:, sorted(carriers)] = IDENTITY
+    return replace(still, rotations=rotations)
 
 
 class _Mover:
