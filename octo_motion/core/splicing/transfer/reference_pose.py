@@ -79,6 +79,9 @@ _DOUBTFUL: Final = 0.2
 _RIGID: Final = 2e-3
 """Of the body's size: what a joint may move against a bone and count as fixed to it."""
 
+_FLAT: Final = 0.1
+"""Of its length: how wide a palm is at least whose fingers tell how it lies."""
+
 _ROOTS: Final = (0.05, 0.12)
 """Of the shoulders' width: how far the collar bones' roots are apart where they begin to tell left
 from right, and where they tell it alone."""
@@ -120,8 +123,17 @@ def has_fingers(clip: Clip, landmarks: Landmarks) -> bool:
 def has_palms(clip: Clip, landmarks: Landmarks) -> bool:
     """Whether the roots of fingers tell how both palms lie."""
     skeleton = clip.skeleton
-    hands = [skeleton.index.get(landmarks.get(f"hand.{side}") or "", -1) for side in "LR"]
-    return all(hand >= 0 and palm_roots(skeleton, hand) is not None for hand in hands)
+    _, heads = skeleton.pose(clip.rotations[:1], clip.locations[:1])
+    for side in "LR":
+        hand = skeleton.index.get(landmarks.get(f"hand.{side}") or "", -1)
+        roots = palm_roots(skeleton, hand) if hand >= 0 else None
+        if roots is None:
+            return False
+        along, across = (each[0] for each in palm_directions(heads, hand, roots))
+        # Some files have all fingers begin at one place.
+        if np.linalg.norm(np.cross(along, across)) < _FLAT * float(along @ along):
+            return False
+    return True
 
 
 def find_reference_pose(

@@ -13,10 +13,13 @@ import numpy as np
 from ...errors import ClipError
 from ...phrases import phrase
 from ...rotations import (
+    IDENTITY,
     Floats,
     conjugate,
     multiply,
+    normalized,
     rotate,
+    shortest_arc,
     slerp,
 )
 from ...skeleton import Skeleton
@@ -199,6 +202,9 @@ class Retarget:
     """Whether the part is seen from upright axes that face as the frames do."""
     spine: bool = False
     """Whether the part is a trunk."""
+    neck: tuple[tuple[int, int], tuple[int, int]] | None = None
+    """Where neck and head begin, on base and splice, if there are further bones between on either:
+    then the first one's turn alone does not tell where the head is."""
     same_build: bool = False
     """Whether the two bodies are the same, up to one factor: not just the part's bones."""
 
@@ -313,8 +319,25 @@ def write_retargeted(
         result = posture_of(base.skeleton, rotations, locations)
         way = rotate(between, other.lean(splice))
         stand_over(body, result, rotations, way, np.ones(len(way)))
+    if retarget.neck is not None:
+        _write_neck(retarget, between, (base.skeleton, splice), rotations, locations)
     if retarget.limb is None:
         return
+    _write_limb(retarget, between, (base, splice), (rotations, locations), exact=exact)
+
+
+def _write_limb(
+    retarget: Retarget,
+    between: Floats,
+    postures: tuple[Posture, Posture],
+    arrays: tuple[Floats, Floats],
+    *,
+    exact: bool,
+) -> None:
+    """Turn joint and elbow so that the hand lies where it was seen."""
+    assert retarget.limb is not None
+    (base, splice), (rotations, locations) = postures, arrays
+    ours, theirs = retarget.frames
     (joint, elbow, hand), (other_joint, other_elbow, other_hand) = retarget.limb
     result = posture_of(base.skeleton, rotations, locations)
     limb = LimbTriangle(result.head(joint), result.head(elbow), result.head(hand))
@@ -336,6 +359,51 @@ def write_retargeted(
         upper_bend, lower_bend = bend_to_reach(turned, wanted.hand, hinge, alike=alike)
         turn, lower_turn = multiply(upper_bend, turn), multiply(lower_bend, turn)
     _turn_limb(result, rotations, (joint, turn), (elbow, lower_turn))
+
+
+def _write_neck(
+    retarget: Retarget,
+    between: Floats,
+    bodies: tuple[Skeleton, Posture],
+    rotations: Floats,
+    locations: Floats,
+) -> None:
+    """Turn a neck so that the head lies where it was seen from the neck, and turned as it was."""
+    assert retarget.neck is not None
+    skeleton, splice = bodies
+    (neck, head), (other_neck, other_head) = retarget.neck
+    # What bends it further on the base alone does nothing.
+    alone = [bone for bone in skeleton.ancestors(head) if neck in skeleton.ancestors(bone)]
+    alone = [bone for bone in alone if bone not in retarget.match.pairs]
+    rotations[:, alone] = IDENTITY
+    result = posture_of(skeleton, rotations, locations)
+    own = normalized(result.head(head) - result.head(neck))
+    wanted = normalized(rotate(between, splice.head(other_head) - splice.head(other_neck)))
+    turned = multiply(shortest_arc(own, wanted), result.orientation(neck))
+    rotations[:, neck] = multiply(conjugate(result.carried(neck)), turned)
+    result = posture_of(skeleton, rotations, locations)
+    seen = multiply(
+        multiply(between, splice.orientation(other_head)), retarget.match.constants[head]
+    )
+    rotations[:, head] = multiply(conjugate(result.carried(head)), seen)
+
+
+def _neck_joints(
+    kind: PartKind, clips: tuple[MappedClip, MappedClip], bones: tuple[list[int], list[int]]
+) -> tuple[tuple[int, int], tuple[int, int]] | None:
+    """Where neck and head begin on both, if the part has them and other bones between."""
+    if kind.limb is not None or kind.root != "head":
+        return None
+    found, further = [], False
+    for mapped, own in zip(clips, bones, strict=True):
+        index = mapped.skeleton.index
+        joints = [index.get(mapped.humanoid().get(each) or "", -1) for each in ("neck", "head")]
+        neck, head = joints
+        if neck not in own or head not in own or neck not in mapped.skeleton.ancestors(head):
+            return None
+        further = further or mapped.skeleton.parents[head] != neck
+        found.append((neck, head))
+    return (found[0], found[1]) if further else None
 
 
 def _turn_limb(
@@ -497,7 +565,10 @@ def _side_retarget(
     limb = None
     if kind.limb is not None:
         limb = _limb_joints(kind, side, base), _limb_joints(kind, side, splice)
-    found = Retarget(base, splice, tuple(bones), frames, match, limb, None, same_build=alike)
+    neck = _neck_joints(kind, clips, (bones, others))
+    found = Retarget(
+        base, splice, tuple(bones), frames, match, limb, None, neck=neck, same_build=alike
+    )
     return replace(found, bodies=bodies_of(*clips), upright=True) if asked == "world" else found
 
 
