@@ -30,6 +30,7 @@ from .clips import (
     write_clip,
 )
 from .fcurves import lasting
+from .object_keys import ObjectKeys
 from .pose_keys import Keyed, PoseKeys, mark_file_changed
 from .poses import (
     SCALE,
@@ -38,6 +39,7 @@ from .poses import (
     animated_bones,
     as_posed,
     displaced_bones,
+    pose_kept,
     pose_values,
     posed_channels,
     rest_channel,
@@ -56,6 +58,7 @@ __all__ = [
     "STEP",
     "Channel",
     "Keyed",
+    "ObjectKeys",
     "PoseKeys",
     "PoseValues",
     "PropertyValues",
@@ -77,6 +80,7 @@ __all__ = [
     "may_replace",
     "note_of",
     "play_bones",
+    "pose_kept",
     "pose_values",
     "posed_channels",
     "read_channels",

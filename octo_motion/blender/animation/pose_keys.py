@@ -35,7 +35,7 @@ from .actions import (
     group_named,
     own_channelbag,
     read_channels,
-    writable_armature,
+    writable_object,
 )
 from .fcurves import KeyArrays, bezier_arrays, read_keys, replace_stretch, write_keys
 from .pose_layers import BLENDING, blend_about, is_dense
@@ -116,7 +116,7 @@ class PoseKeys:
         *,
         blend: float = 8.0,
     ) -> None:
-        writable_armature(armature)
+        writable_object(armature)
         self._blend = blend
         self._target: Target = target
         self._chosen = _number(chosen)
@@ -182,7 +182,7 @@ class PoseKeys:
                     done.append(each.bone)
         if not done and len(self._noted) > known:
             # No action is left behind that nothing went into.
-            _take_back(armature, self._noted.pop())
+            self.drop_last(armature)
         if done:
             self.count += 1
             mark_file_changed()
@@ -257,6 +257,10 @@ class PoseKeys:
         mark_file_changed()
         return len(found[0])
 
+    def drop_last(self, armature: bpy.types.Object) -> None:
+        """Undo what was noted last."""
+        _take_back(armature, self._noted.pop())
+
     def take_back(self, armature: bpy.types.Object) -> None:
         """Undo all keys, actions and tracks of this session; safe to call twice.
 
@@ -280,7 +284,7 @@ class PoseKeys:
         data = armature.animation_data
         if self._noted and data is not None and _has(data, self._noted[-1]):
             return
-        writable_armature(armature)
+        writable_object(armature)
         had_data = data is not None
         data = data or armature.animation_data_create()
         assert data is not None

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, Final
 
@@ -207,6 +208,22 @@ def restore_pose(armature: bpy.types.Object, values: PoseValues) -> None:
     for bone in armature.pose.bones:
         for channel, value in zip(AT_REST, values.get(bone.name, ()), strict=False):
             setattr(bone, channel, value)
+
+
+@contextmanager
+def pose_kept(armature: bpy.types.Object) -> Iterator[None]:
+    """Let bones without keys keep their pose.
+
+    For an action that is new on the armature, or has new curves, Blender would pose all bones by
+    their keys, those that are posed and not keyed yet as well.
+    """
+    values = pose_values(armature)
+    try:
+        yield
+    finally:
+        if bpy.context.view_layer is not None:
+            bpy.context.view_layer.update()
+        restore_pose(armature, values)
 
 
 def show_pose(

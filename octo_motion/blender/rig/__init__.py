@@ -32,6 +32,7 @@ from .armature import (
 from .controlled_puppet import puppet_of
 from .puppet import Puppet
 from .puppet_reading import (
+    PuppetRig,
     bone_materials,
     is_part_of,
     mark_bones,
@@ -43,6 +44,7 @@ __all__ = [
     "ALIGNED",
     "SUCKER_PROPERTY",
     "Puppet",
+    "PuppetRig",
     "active_armature",
     "arm_skins",
     "armature_data",

@@ -2,6 +2,7 @@
 """Curves, meshes, markers and importers."""
 
 from .clip_placing import place_clip, room_of, show_selected
+from .company import Company, check_partner, part_of_pose
 from .contact_markers import Contact, markers, read_markers, remove_markers, write_markers
 from .curves import add_route_curve, read_route, suggested_control_points
 from .grasp_target import (
@@ -16,6 +17,7 @@ from .grasp_target import (
     read_places,
 )
 from .imports import NOTE, ImportedClip, Up, import_clip, remove_clips
+from .loose_objects import LooseObject
 from .octopus import add_octopus
 from .surfaces import is_enabled, read_obstacle, read_triangles
 
@@ -23,18 +25,22 @@ __all__ = [
     "CARRIED",
     "NOTE",
     "WITH_SURFACE",
+    "Company",
     "Contact",
     "ImportedClip",
+    "LooseObject",
     "Up",
     "add_octopus",
     "add_route_curve",
     "can_be_carried",
+    "check_partner",
     "hangs_on",
     "home_of",
     "import_clip",
     "is_carried",
     "is_enabled",
     "markers",
+    "part_of_pose",
     "place_clip",
     "put_back",
     "read_form",

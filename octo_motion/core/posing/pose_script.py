@@ -37,6 +37,10 @@ class ScriptStep:
     seconds: float = 0.0
     frame: int = 0
     bones: str | tuple[str, ...] = "touched"
+    hand: str = ""
+    """Which of several hands, by any name."""
+    meanwhile: bool = False
+    """Whether the next steps go on while this pull lasts."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,8 @@ class PoseScript:
     steps: tuple[ScriptStep, ...]
     settings: Mapping[str, Any]
     """By name, of ``Object.octo_motion.posing``."""
+    figures: tuple[str, ...] = ()
+    """Names of other armatures that are posed along."""
 
 
 _NEEDED: Final[dict[str, frozenset[str]]] = {
@@ -63,8 +69,9 @@ _NEEDED: Final[dict[str, frozenset[str]]] = {
 }
 """Steps, and what each must say."""
 _ALLOWED: Final[dict[str, frozenset[str]]] = {
-    "grab": frozenset({"bone", "at"}),
-    "pull": frozenset({"by", "to", "turn", "seconds"}),
+    "grab": frozenset({"bone", "at", "hand"}),
+    "pull": frozenset({"by", "to", "turn", "seconds", "hand", "meanwhile"}),
+    "release": frozenset({"hand"}),
     "key": frozenset({"bones"}),
 }
 """What else a step may say, where that is more than it must."""
@@ -98,7 +105,7 @@ def parse_script(text: str, name: str) -> PoseScript:
             ),
             phrase("This version of Octo Motion reads version {version}.", version=VERSION),
         )
-    extra = sorted(set(data) - {"format", "version", "settings", "steps"})
+    extra = sorted(set(data) - {"format", "version", "settings", "steps", "figures"})
     settings, steps = data.get("settings", {}), data.get("steps")
     if extra:
         raise SettingsError(
@@ -110,9 +117,16 @@ def parse_script(text: str, name: str) -> PoseScript:
             phrase("'{name}' has no list of steps, or odd settings.", name=name),
             "See the scripting reference.",
         )
+    figures = data.get("figures", [])
+    if not isinstance(figures, list) or not all(map(_text, figures)):
+        raise SettingsError(
+            phrase("'{name}' names other figures in an odd way.", name=name),
+            "It is a list of armatures' names.",
+        )
     return PoseScript(
         steps=tuple(_step(each, number) for number, each in enumerate(steps, 1)),
         settings=settings,
+        figures=tuple(figures),
     )
 
 
@@ -149,6 +163,10 @@ def _step(data: Any, number: int) -> ScriptStep:
 
 def _text(value: Any) -> str | None:
     return value if isinstance(value, str) and value else None
+
+
+def _yes_or_no(value: Any) -> bool | None:
+    return value if isinstance(value, bool) else None
 
 
 def _number_up_to(most: float) -> Callable[[Any], float | None]:
@@ -193,4 +211,6 @@ _READERS: Final[dict[str, Callable[[Any], Any]]] = {
     "seconds": _number_up_to(LONGEST),
     "frame": _whole,
     "bones": _names,
+    "hand": _text,
+    "meanwhile": _yes_or_no,
 }

@@ -379,7 +379,11 @@ class DeviceHands(HandsBase):
             self.client.send_figure(session.figure, session.core.pose)
             self._pins = {}
         held = session.root_is_held
-        pins = {body: held or session.figure.parents[body] >= 0 for body in session.core.pins}
+        own = session.puppet.own
+        pins = {
+            body: firm if body not in own else held or session.figure.parents[body] >= 0
+            for body, firm in session.core.pins.items()
+        }
         if pins != self._pins:
             self._pins = pins
             self.client.send_pins(pins)

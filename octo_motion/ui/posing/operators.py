@@ -26,7 +26,7 @@ from ...core.posing.puppet import Bend, Figure, JointCoefficients
 from ..language import reported
 from ..operator_base import ArmatureOperator, OctoOperator
 from .measuring_hand import BEARS, check_joint, coefficients, measured_joint
-from .properties import OBSTACLES, posing_settings
+from .properties import MOVES, OBSTACLES, STANDS, posing_settings
 from .puppet_session import PuppetSession, active_session
 from .session_settings import joints_of_now, keep_material
 
@@ -84,21 +84,67 @@ class OCTO_MOTION_OT_pose_obstacle(OctoOperator, bpy.types.Operator):
         )
 
     def run(self, context: bpy.types.Context) -> None:
-        chosen = [each for each in context.selected_objects if each.type != "ARMATURE"]
-        if not chosen:
-            raise RigError(
-                "No object that could be an obstacle is selected.", "Select a mesh or an empty."
-            )
-        for each in chosen:
-            if not each.is_editable:
-                raise WriteError(
-                    phrase("'{each}' is linked and read-only here.", each=each.name),
-                    "Make a library override.",
-                )
+        chosen = _solid_objects(context)
         for item in chosen:
             own: Any = item
             own.octo_motion.posing.obstacle = self.kind
         self.report({"INFO"}, reported(phrase("Marked {count} objects.", count=len(chosen))))
+
+
+class OCTO_MOTION_OT_pose_loose(OctoOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.pose_loose"
+    bl_label = "Let Be Pushed"
+    bl_description = (
+        "Let puppets push, lift and topple the selected objects while they are posed, or let them "
+        "stand still again"
+    )
+
+    moves: EnumProperty(
+        name="Movement", description="What happens to them", items=MOVES, default="MOVES"
+    )
+    mass: FloatProperty(
+        name="Mass",
+        description="How heavy each is to push, kg; 0 takes its volume for wood",
+        min=0.0,
+        soft_max=1000.0,
+    )
+
+    @classmethod
+    def obstacle(cls, context: bpy.types.Context) -> str:
+        return OCTO_MOTION_OT_pose_obstacle.obstacle(context)
+
+    def run(self, context: bpy.types.Context) -> None:
+        chosen = _solid_objects(context)
+        for item in chosen:
+            own: Any = item
+            settings = own.octo_motion.posing
+            settings.moves = self.moves
+            if self.moves != STANDS:
+                settings.mass = self.mass
+                if settings.obstacle in {"NONE", "PLANE"}:
+                    settings.obstacle = "HULL" if item.type == "MESH" else "BOX"
+        self.report({"INFO"}, reported(phrase("Marked {count} objects.", count=len(chosen))))
+
+
+def _solid_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected objects that can be solid.
+
+    Raises:
+        RigError: there are none.
+        WriteError: one is linked.
+    """
+    chosen = [each for each in context.selected_objects if each.type != "ARMATURE"]
+    if not chosen:
+        raise RigError(
+            "No object that could be an obstacle is selected.", "Select a mesh or an empty."
+        )
+    for each in chosen:
+        if not each.is_editable:
+            raise WriteError(
+                phrase("'{each}' is linked and read-only here.", each=each.name),
+                "Make a library override.",
+            )
+    return chosen
 
 
 # --- Saying how a joint is to give way, and getting the material that does so ---------------------

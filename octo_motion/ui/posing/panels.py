@@ -27,12 +27,13 @@ from .device_settings import device_settings, key_file
 from .operators import (
     OCTO_MOTION_OT_pose_coefficients,
     OCTO_MOTION_OT_pose_forget_measured,
+    OCTO_MOTION_OT_pose_loose,
     OCTO_MOTION_OT_pose_mark_bones,
     OCTO_MOTION_OT_pose_measure,
     OCTO_MOTION_OT_pose_obstacle,
 )
 from .pose_operator import OCTO_MOTION_OT_pose_start
-from .properties import posing_settings
+from .properties import STANDS, posing_settings
 from .puppet_session import active_session
 from .script_player import OCTO_MOTION_OT_pose_script
 from .session_settings import CUSTOM
@@ -89,10 +90,16 @@ class OCTO_MOTION_PT_posing_world(PosePanel, bpy.types.Panel):
         layout.prop(settings, "friction")
         item: Any = bpy.context.object
         if item is not None and item.type != "ARMATURE":
-            layout.prop(item.octo_motion.posing, "obstacle")
+            own = item.octo_motion.posing
+            layout.prop(own, "obstacle")
+            if own.obstacle != "NONE":
+                layout.prop(own, "moves")
+                if own.moves != STANDS:
+                    layout.prop(own, "mass")
         layout.operator_menu_enum(
             OCTO_MOTION_OT_pose_obstacle.bl_idname, "kind", text="Mark Selected As"
         )
+        layout.operator_menu_enum(OCTO_MOTION_OT_pose_loose.bl_idname, "moves", text="Selected")
 
 
 class OCTO_MOTION_PT_posing_bones(PosePanel, bpy.types.Panel):

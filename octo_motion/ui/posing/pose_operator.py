@@ -62,7 +62,8 @@ class SessionOperator(ArmatureOperator):
         assert window_manager is not None
         assert scene is not None
         try:
-            self._session = PuppetSession(active_armature(context), scene)
+            armature = active_armature(context)
+            self._session = PuppetSession(armature, scene, partners=partners(context, armature))
             self._overlay = self.take_up(context, self._session)
             self._timer = window_manager.event_timer_add(_RATE, window=window)
             window_manager.modal_handler_add(cast("bpy.types.Operator", self))
@@ -132,6 +133,12 @@ class SessionOperator(ArmatureOperator):
             if timer is not None and context.window_manager is not None:
                 context.window_manager.event_timer_remove(timer)
             tell(context, None)
+
+
+def partners(context: bpy.types.Context, armature: bpy.types.Object) -> list[bpy.types.Object]:
+    """Other armatures that are posed along: those selected, or in pose mode too."""
+    chosen = context.objects_in_mode if context.mode == "POSE" else context.selected_objects
+    return [each for each in chosen if each.type == "ARMATURE" and each != armature]
 
 
 def tell(

@@ -32,6 +32,13 @@ OBSTACLES: Final = (
     ("MESH", "Mesh", "The object's own surface; slow with many faces", 6),
 )
 
+STANDS: Final = "STANDS"
+MOVES: Final = (
+    (STANDS, "Stands Still", "It stops a puppet, and nothing moves it", 0),
+    ("MOVES", "Can Be Pushed", "Puppets push, lift and topple it; it has weight always", 1),
+    ("FLOATS", "Floats", "As Can Be Pushed, and without weight where the puppet has none", 2),
+)
+
 TARGETS: Final = (
     (
         "CURRENT",
@@ -214,6 +221,20 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         name="Obstacle",
         description="What puppets take this object for",
         items=OBSTACLES,
+    )
+    moves: props.EnumProperty(
+        name="Movement",
+        description="Whether puppets can push this object about while they are posed",
+        items=MOVES,
+    )
+    mass: props.FloatProperty(
+        name="Mass",
+        description="How heavy it is to push, kg; 0 takes its volume for wood",
+        default=0.0,
+        min=0.0,
+        soft_max=1000.0,
+        precision=2,
+        unit="MASS",
     )
 
 

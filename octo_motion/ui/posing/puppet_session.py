@@ -7,8 +7,7 @@ Points are in the world and in Blender's units; the puppet's own metres stay ins
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -19,11 +18,12 @@ from ...blender.animation import (
     Keyed,
     PoseKeys,
     mark_file_changed,
+    pose_kept,
     pose_values,
     restore_pose,
     writable_armature,
 )
-from ...blender.rig import puppet_of, read_rig
+from ...blender.scene import part_of_pose
 from ...core.errors import OctoMotionError, RigError, SettingsError
 from ...core.phrases import as_phrase, joined_phrases, phrase
 from ...core.posing.picking import Hit, pick
@@ -34,11 +34,14 @@ from ...core.posing.puppet import (
     Material,
     Pose,
     capsules_in_world,
+    joined_elements,
     joint_loads,
+    part_of,
 )
 from ...core.posing.session import HandSample, Session, TickReport, hand_for
 from ...core.posing.solver import HandSpring, OneThread, WorldSettings
 from ...core.rotations import IDENTITY, Floats, rotate
+from .companions import Companions, company_of, elements_beside, hold_partners
 from .measuring_hand import MeasuringHand, coefficients, measured_joint
 from .properties import posing_settings
 from .recording import Recording
@@ -57,26 +60,27 @@ class PosedPuppet:
         armature: bpy.types.Object,
         scene: bpy.types.Scene,
         clock: Callable[[], float] | None,
+        partners: Sequence[bpy.types.Object] = (),
     ) -> None:
-        panel: Any = posing_settings(armature)
-        self.puppet = puppet_of(armature, read_rig(armature, smallest=panel.smallest))
+        self.puppet = company_of(armature, partners, scene)
         self.settings = SessionSettings.of(armature)
-        self.materials = BoneMaterials(self.puppet)
+        self.materials = BoneMaterials(self.puppet.main)
         self.measuring: MeasuringHand | None = None
         self.warning = ""
         """What is wrong with the scene, and keeps nobody from posing."""
         self._scene = scene.session_uid
         figure = self.puppet.figure
         self.core = Session(
-            replace(figure, elements=self.settings.elements(figure, self.materials.by_body)),
-            self.puppet.rig.pose,
+            replace(figure, elements=self._elements_of(self.puppet.main.figure)),
+            self.puppet.pose,
             WorldSettings(**self.settings.world),
             self.settings.obstacles(self.puppet, scene),
             clock=clock,
         )
-        self.core.coupling = hand_for(figure, self.settings.strength)
+        self.core.coupling = hand_for(self.own_figure, self.settings.strength)
         self._weights = joint_loads(figure)
-        self.settings.hold_root(self.puppet, self.core)
+        self.settings.hold_root(self.puppet.main, self.core)
+        hold_partners(self.puppet, self.core)
 
     # --- What is there --------------------------------------------------------------------------
 
@@ -101,6 +105,11 @@ class PosedPuppet:
         return self.core.figure
 
     @property
+    def own_figure(self) -> Figure:
+        """Of the armature alone, without what is beside it."""
+        return part_of(self.core.figure, 0)
+
+    @property
     def shown_pose(self) -> Pose:
         """Where the bodies are, with the joint bent that is being measured."""
         return self.core.pose if self.measuring is None else self.measuring.pose()
@@ -119,7 +128,7 @@ class PosedPuppet:
         Raises:
             RigError: there is no such bone, or it follows nothing.
         """
-        return self.puppet.rig.body(bone, self.puppet.name)
+        return self.puppet.body(bone)
 
     def capsules(self) -> tuple[Floats, Floats]:
         """Ends (bodies, 2, 3) and radii (bodies,) of the limbs in the world."""
@@ -131,7 +140,8 @@ class PosedPuppet:
     @property
     def size(self) -> float:
         """The largest extent of the puppet as it stands, in units of the world."""
-        return float(np.ptp(self.capsules()[0].reshape(-1, 3), axis=0).max())
+        ends = self.capsules()[0][self.puppet.own]
+        return float(np.ptp(ends.reshape(-1, 3), axis=0).max())
 
     def held_point(self) -> Floats | None:
         """(3,) the point in the hand, world."""
@@ -147,7 +157,7 @@ class PosedPuppet:
 
     def pull(self) -> float:
         """How hard the hand pulls, in weights of the whole figure."""
-        weight = -GRAVITY[2] * float(self.figure.masses.sum())
+        weight = -GRAVITY[2] * float(self.figure.masses[self.puppet.own].sum())
         return float(np.linalg.norm(self.core.force())) / weight
 
     @property
@@ -180,12 +190,28 @@ class PosedPuppet:
         Raises:
             RigError: there is no such bone.
         """
+        self.core.release()
+        return self.take_bone(bone, share)[1]
+
+    def take_bone(self, bone: str, share: float) -> tuple[HandSpring, Floats]:
+        """Take hold of a bone with one more hand; what holds it, and the point (3,) in the world.
+
+        Raises:
+            RigError: there is no such bone.
+        """
         body, pose = self.body(bone), self.core.pose
         # From the joint to the limb's end, in the middle of which its mass is: of a ball too.
         way = 2.0 * share * self.figure.centres[body]
         point = pose.positions[body] + rotate(pose.orientations[body], way)
-        self.grab(body, point)
-        return point / self.unit
+        return self.core.grab(body, point), point / self.unit
+
+    def is_edited(self) -> bool:
+        """Whether the armature is in edit mode, where nothing is posed.
+
+        Raises:
+            RigError: it is gone.
+        """
+        return any(each.mode == "EDIT" for each in self.puppet.armatures())
 
     # --- Settings -------------------------------------------------------------------------------
 
@@ -196,12 +222,12 @@ class PosedPuppet:
         before, self.settings = self.settings, settings
         if before.joints != settings.joints:
             self.core.change_elements(self._elements())
-            self.core.coupling = hand_for(self.figure, settings.strength)
+            self.core.coupling = hand_for(self.own_figure, settings.strength)
         if before.ground != settings.ground:
             self.see_obstacles()
         self.core.change(**settings.world)
         if before.root != settings.root:
-            settings.hold_root(self.puppet, self.core)
+            settings.hold_root(self.puppet.main, self.core)
 
     def see_obstacles(self) -> None:
         """Take obstacles as they are now; with one that is damaged, they stay as they were."""
@@ -230,7 +256,7 @@ class PosedPuppet:
         """
         assert self.measuring is not None
         body, bend = self.measuring.body, self.measuring.bend()
-        measured, material = measured_joint(self.figure, body, self.settings.strength, bend)
+        measured, material = measured_joint(self.own_figure, body, self.settings.strength, bend)
         self.take_material(material, self.bone(body) if bone_only else "")
         self.drop_measure()
         return coefficients(self.bone(body), measured)
@@ -255,23 +281,11 @@ class PosedPuppet:
         self.core.change_elements(self._elements())
 
     def _elements(self) -> Elements:
-        return self.settings.elements(self.figure, self.materials.by_body)
+        return self._elements_of(self.own_figure)
 
-
-@contextmanager
-def _pose_kept(armature: bpy.types.Object) -> Iterator[None]:
-    """Let bones without keys keep their pose.
-
-    For an action that is new on the armature, or has new curves, Blender would pose all bones by
-    their keys, those that are posed and not keyed yet as well.
-    """
-    values = pose_values(armature)
-    try:
-        yield
-    finally:
-        if bpy.context.view_layer is not None:
-            bpy.context.view_layer.update()
-        restore_pose(armature, values)
+    def _elements_of(self, figure: Figure) -> Elements:
+        own = self.settings.elements(figure, self.materials.by_body)
+        return joined_elements([own, *elements_beside(self.puppet)])
 
 
 _active: list[PuppetSession] = []
@@ -294,9 +308,11 @@ class KeyedPuppet(PosedPuppet):
         armature: bpy.types.Object,
         scene: bpy.types.Scene,
         clock: Callable[[], float] | None,
+        partners: Sequence[bpy.types.Object] = (),
     ) -> None:
         writable_armature(armature)
-        super().__init__(armature, scene, clock)
+        super().__init__(armature, scene, clock, partners)
+        self.companions = Companions(self.puppet)
         settings: Any = posing_settings(armature)
         self.missed = ""
         """What of the pose the rig's controls cannot give, if it is posed through these."""
@@ -315,9 +331,10 @@ class KeyedPuppet(PosedPuppet):
     def words_for(self, keyed: list[str]) -> str:
         """Which bones got keys now, or why none did, for people."""
         if keyed:
+            things = len({each.name for each in self.puppet.things}.intersection(keyed))
             told = phrase(
                 "Keyed {bones} at frame {frame}",
-                bones=_bones(len(keyed)),
+                bones=_bones_and_things(len(keyed) - things, things),
                 frame=self.scene().frame_current,
             )
             if beneath := self.keys.layered:
@@ -345,13 +362,15 @@ class KeyedPuppet(PosedPuppet):
         self, bodies: Iterable[int], *, auto: bool = False, all_bones: bool = False
     ) -> list[str]:
         self.settle()
-        wanted = self.puppet.keyed(bodies, all_bones=all_bones)
-        keyed = [Keyed(bone, placed) for bone, placed in wanted]
-        if not keyed:
-            return []
+        wanted = list(bodies)
+        own = [body for body in wanted if body in self.puppet.own]
+        keyed = [Keyed(*each) for each in self.puppet.main.keyed(own, all_bones=all_bones)]
         frame, armature = self.scene().frame_current_final, self.puppet.armature()
-        with _pose_kept(armature):
-            return self.keys.insert(armature, keyed, frame, auto=auto)
+        done: list[str] = []
+        if keyed:
+            with pose_kept(armature):
+                done = self.keys.insert(armature, keyed, frame, auto=auto)
+        return done + self.companions.insert(wanted, frame, auto=auto, all_bones=all_bones)
 
 
 class PuppetSession(KeyedPuppet):
@@ -367,14 +386,16 @@ class PuppetSession(KeyedPuppet):
         scene: bpy.types.Scene,
         *,
         clock: Callable[[], float] | None = time.perf_counter,
+        partners: Sequence[bpy.types.Object] = (),
     ) -> None:
+        """Of an armature, and of other ones that are posed along with it."""
         going_on = active_session()
         if going_on is not None:
             raise RigError(
                 phrase("'{puppet}' is being posed already.", puppet=going_on.puppet.name),
                 "End that session first, with Enter or Esc over its viewport.",
             )
-        super().__init__(armature, scene, clock)
+        super().__init__(armature, scene, clock, partners)
         self._values = pose_values(armature)
         self._frame = self._started = scene.frame_current_final
         self._recording: Recording | None = None
@@ -389,11 +410,13 @@ class PuppetSession(KeyedPuppet):
 
     # --- The hand -------------------------------------------------------------------------------
 
-    def release(self) -> list[str]:
-        """Let go; with auto keying, what the hand has moved gets keys. The keyed bones."""
+    def release(self, spring: HandSpring | None = None) -> list[str]:
+        """Let go, with one hand or with all; with auto keying, what was moved gets keys. The keyed
+        bones.
+        """
         if self.held is None:
             return []
-        self.core.release()
+        self.core.release(spring)
         self.settle()
         mark_file_changed()
         tools = self.scene().tool_settings
@@ -403,20 +426,18 @@ class PuppetSession(KeyedPuppet):
 
     # --- Time -----------------------------------------------------------------------------------
 
-    def is_edited(self) -> bool:
-        """Whether the armature is in edit mode, where nothing is posed.
-
-        Raises:
-            RigError: it is gone.
-        """
-        return self.puppet.found().mode == "EDIT"
-
     def tick(
-        self, seconds: float, position: Floats | None = None, turn: Floats | None = None
+        self,
+        seconds: float,
+        position: Floats | None = None,
+        turn: Floats | None = None,
+        *,
+        hands: Mapping[HandSpring, tuple[Floats, Floats]] | None = None,
     ) -> TickReport:
         """Simulate so many seconds of real time, and pose the armature.
 
-        The hand is at a position (3,), world, and has turned by (4,) since it took hold.
+        The first hand is at a position (3,), world, and has turned by (4,) since it took hold; of
+        others, or of all, ``hands`` has the same.
 
         Raises:
             RigError: the armature is gone, changed or in edit mode.
@@ -442,11 +463,14 @@ class PuppetSession(KeyedPuppet):
             # Time stands still meanwhile.
             self.report = TickReport(0.0, 0, 1.0, self.core.world.settings.step, resting=False)
             return self.report
-        hands: dict[HandSpring, HandSample] = {}
+        held = {
+            spring: HandSample(place * self.unit, turned)
+            for spring, (place, turned) in (hands or {}).items()
+        }
         if self.held is not None and position is not None:
             turned = IDENTITY if turn is None else turn
-            hands[self.held] = HandSample(position * self.unit, turned)
-        self.report = self.core.tick(seconds, hands)
+            held[self.held] = HandSample(position * self.unit, turned)
+        self.report = self.core.tick(seconds, held)
         if not self.report.resting:
             self.puppet.write(self.core.pose)
         return self.report
@@ -455,11 +479,20 @@ class PuppetSession(KeyedPuppet):
         """From now on the hand shows how the joint of a limb is to bend, and nothing resists.
 
         Raises:
-            RigError: the limb has no joint.
+            RigError: the limb has no joint, or is that of another figure.
             SettingsError: a recording is going on.
         """
         if self.recording:
             raise SettingsError("A recording is going on.", "End it before you measure.")
+        if body not in self.puppet.own:
+            raise RigError(
+                phrase(
+                    "'{bone}' does not belong to '{puppet}'.",
+                    bone=self.bone(body),
+                    puppet=self.puppet.name,
+                ),
+                "Measure it in a session of its own.",
+            )
         self.core.release()
         self.measuring = MeasuringHand(self.figure, self.core.pose, body)
 
@@ -493,19 +526,26 @@ class PuppetSession(KeyedPuppet):
             WriteError: a motion could not be written.
         """
         self.keys.check_motion(self.puppet.armature())
-        self._recording = Recording(self.puppet, self.scene().frame_current_final, self.core.pose)
+        self.companions.check_motion()
+        frame, pose = self.scene().frame_current_final, self.core.pose
+        self._recording = Recording(self.puppet.main, frame, self._own(pose))
+        self.companions.record(frame, pose)
+
+    def _own(self, pose: Pose) -> Pose:
+        return part_of_pose(pose, self.puppet.own)
 
     def stop_record(self) -> tuple[int, int]:
         """Write what was kept as few keys; number of bones and of key frames."""
         recording, self._recording = self._recording, None
         if recording is None:
             return 0, 0
-        with _pose_kept(self.puppet.armature()):
+        with pose_kept(self.puppet.armature()):
             bones, count = recording.write(self.keys)
-        if recording.go_along(bones) and bpy.context.view_layer is not None:
+        others = self.companions.write_motion()
+        if (recording.go_along(bones) or others) and bpy.context.view_layer is not None:
             bpy.context.view_layer.update()
             self._adopt()
-        return len(bones), count
+        return len(bones) + others, count
 
     # --- Ends -----------------------------------------------------------------------------------
 
@@ -553,14 +593,15 @@ class PuppetSession(KeyedPuppet):
         self.core.release()
         self._leave()
         try:
-            armature = self.puppet.found()
+            armature = self.puppet.main.found()
             scene = self.scene()
         except OctoMotionError:
             return
-        with _pose_kept(armature):
+        with pose_kept(armature):
             self.materials.take_back(armature)
             self.keys.take_back(armature)
         restore_pose(armature, self._values)
+        self.companions.take_back()
         if scene.frame_current_final != self._started:
             # What has keys is at another frame now.
             scene.frame_set(scene.frame_current, subframe=scene.frame_subframe)
@@ -631,10 +672,22 @@ class PuppetSession(KeyedPuppet):
             self._recording = None
             bones, _ = recording.write(self.keys)
             recording.go_along(bones)
+            self.companions.write_motion()
             self.core.adopt(self.puppet.read())
             return
-        recording.keep(frame, self.core.pose)
-        self.puppet.write(self.core.pose)
+        pose = self.core.pose
+        self.puppet.write(pose)
+        recording.keep(frame, self._own(pose))
+        self.companions.keep(frame, pose)
+
+
+def _bones_and_things(bones: int, things: int) -> str:
+    if not things:
+        return _bones(bones)
+    objects = phrase("1 object") if things == 1 else phrase("{count} objects", count=things)
+    if not bones:
+        return objects
+    return phrase("{bones} and {objects}", bones=_bones(bones), objects=objects)
 
 
 def _bones(count: int) -> str:

@@ -6,16 +6,23 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, Final
 
+import bpy
 import numpy as np
 
-from ...blender.animation import PoseKeys, pose_values, restore_pose
+from ...blender.animation import ObjectKeys, PoseKeys, pose_values, restore_pose
 from ...blender.rig import Puppet
+from ...blender.scene import LooseObject
+from ...core.keyframes import rotation_property
 from ...core.posing.puppet import Pose, turned_bodies
 from ...core.rotations import Floats
 from .properties import posing_settings
 
 _LOCATION_SHARE: Final = 0.002
 """Of the figure's size: how far a recorded location's keys may be off."""
+
+
+_ANGLE: Final = float(np.radians(0.5))
+"""By which a recorded object's keys may be off."""
 
 
 class Recording:
@@ -32,6 +39,10 @@ class Recording:
     def keep(self, frame: float, pose: Pose) -> None:
         """One frame more, or another pose at one."""
         self._moments[frame] = pose, *self._puppet.local(pose)
+
+    def armature(self) -> bpy.types.Object:
+        """Whose pose it is."""
+        return self._puppet.armature()
 
     def is_past(self, frame: float) -> bool:
         """Whether a frame lies before the last one: playback has come round."""
@@ -80,3 +91,41 @@ class Recording:
         }
         restore_pose(armature, back)
         return bool(back)
+
+
+class ObjectRecording:
+    """Where a loose object is, frame by frame, from the one where it begins."""
+
+    def __init__(self, thing: LooseObject, frame: float) -> None:
+        self._thing = thing
+        self._moments: dict[float, tuple[Floats, Floats]] = {}
+        self.keep(frame)
+
+    def keep(self, frame: float) -> None:
+        """One frame more, as the object is now."""
+        item = self._thing.found()
+        turn = getattr(item, rotation_property(item.rotation_mode))
+        self._moments[frame] = np.array(item.location), np.array(turn)
+
+    def write(self, keys: ObjectKeys) -> int:
+        """Set keys; 1 where the object has moved, else 0."""
+        frames = np.array(sorted(self._moments))
+        places, turns = (
+            np.array(each) for each in zip(*map(self._moments.get, frames), strict=True)
+        )
+        if len(frames) < 2 or not (np.ptp(places, axis=0).any() or np.ptp(turns, axis=0).any()):
+            return 0
+        item = self._thing.found()
+        if item.rotation_mode == "QUATERNION":
+            # The same turn has two signs; the way between keys must not go through nothing.
+            flips = np.cumprod(np.where((turns[1:] * turns[:-1]).sum(axis=1) < 0.0, -1.0, 1.0))
+            turns[1:] *= flips[:, None]
+        size = float(np.array(item.dimensions).max()) or 1.0
+        keys.insert_path(
+            item,
+            frames,
+            {"location": places, rotation_property(item.rotation_mode): turns},
+            angle=_ANGLE,
+            distance=_LOCATION_SHARE * size,
+        )
+        return 1

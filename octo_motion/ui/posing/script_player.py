@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,6 +16,7 @@ from ...core.errors import OctoMotionError, SettingsError
 from ...core.files import read_text
 from ...core.phrases import phrase
 from ...core.posing.pose_script import PoseScript, ScriptStep, parse_script
+from ...core.posing.solver import HandSpring
 from ...core.rotations import IDENTITY, Floats, from_rotation_vector, multiply
 from ..language import reported
 from ..operator_base import ArmatureOperator, FileOperator
@@ -25,18 +27,52 @@ TICK: Final = 1.0 / 60.0
 """Seconds: a script moves the hand as often as the mouse does."""
 
 
+@dataclass(eq=False)
+class _Hand:
+    """A hand of a script, and where it is."""
+
+    spring: HandSpring
+    place: Floats
+    """(3,) world."""
+    turn: Floats = field(default_factory=IDENTITY.copy)
+    """(4,) since it took hold."""
+
+
+@dataclass(eq=False)
+class _Way:
+    """A pull that is going on."""
+
+    hand: _Hand
+    end: Floats
+    swing: Floats
+    """(3,) rotation vector."""
+    ticks: int
+    passed: int = 0
+
+    def __post_init__(self) -> None:
+        self._start, self._turned = self.hand.place, self.hand.turn
+
+    def go_on(self) -> bool:
+        """One tick more; whether it is there."""
+        self.passed += 1
+        share = self.passed / self.ticks
+        self.hand.place = self._start + share * (self.end - self._start)
+        self.hand.turn = multiply(from_rotation_vector(share * self.swing), self._turned)
+        return self.passed >= self.ticks
+
+
 class Player:
     """Plays a script on a session that has no clock, so that each run is the same."""
 
     def __init__(self, session: PuppetSession, script: PoseScript) -> None:
         self._session = session
         self._script = script
-        self._hand: Floats | None = None
-        self._turn = IDENTITY.copy()
+        self._hands: dict[str, _Hand] = {}
+        self._ways: list[_Way] = []
         self._played = 0.0
         """Seconds since the frame that is shown while recording."""
         self.keys = 0
-        """How many bones were keyed, all in all."""
+        """How many bones and objects were keyed, all in all."""
 
     def play(self) -> None:
         """All steps, in order.
@@ -56,33 +92,46 @@ class Player:
                     ),
                     error.remedy,
                 ) from error
+        while self._ways:
+            self._tick()
 
     def _grab(self, step: ScriptStep) -> None:
-        self._hand = self._session.grab_bone(step.bone, step.at)
-        self._turn = IDENTITY.copy()
+        before = self._hands.pop(step.hand, None)
+        if before is not None:
+            self._drop(before)
+            self._session.core.release(before.spring)
+        spring, place = self._session.take_bone(step.bone, step.at)
+        self._hands[step.hand] = _Hand(spring, place)
 
     def _pull(self, step: ScriptStep) -> None:
-        if self._hand is None:
+        self._forget_lost()
+        hand = self._hands.get(step.hand)
+        if hand is None:
             raise SettingsError("Nothing is held.", "Put a step 'grab' before it.")
-        start, turned = self._hand, self._turn
-        end = start if step.to is None else np.array(step.to)
+        self._drop(hand)
+        end = hand.place if step.to is None else np.array(step.to)
         if step.by is not None:
-            end = start + np.array(step.by)
-        swing = np.radians(np.array(step.turn))
-        count = max(1, round(step.seconds / TICK))
-        for number in range(1, count + 1):
-            share = number / count
-            self._hand = start + share * (end - start)
-            self._turn = multiply(from_rotation_vector(share * swing), turned)
+            end = hand.place + np.array(step.by)
+        ticks = max(1, round(step.seconds / TICK))
+        way = _Way(hand, end, np.radians(np.array(step.turn)), ticks)
+        self._ways.append(way)
+        while not step.meanwhile and way in self._ways:
             self._tick()
 
     def _wait(self, step: ScriptStep) -> None:
         for _ in range(round(step.seconds / TICK)):
             self._tick()
 
-    def _release(self, _step: ScriptStep) -> None:
-        self._hand = None
-        self.keys += len(self._session.release())
+    def _release(self, step: ScriptStep) -> None:
+        hand = self._hands.pop(step.hand, None)
+        if hand is None or not step.hand:
+            # Without a name, all of them.
+            self._hands.clear()
+            self._ways.clear()
+            self.keys += len(self._session.release())
+            return
+        self._drop(hand)
+        self.keys += len(self._session.release(hand.spring))
 
     def _pin(self, step: ScriptStep) -> None:
         self._session.core.pin(self._session.body(step.bone), state=True)
@@ -94,8 +143,7 @@ class Player:
         scene = self._session.scene()
         if not self._session.recording:
             scene.frame_set(step.frame)
-            if self._session.held is None:
-                self._hand = None
+            self._forget_lost()
         # While recording, time goes by from frame to frame, and the hand waits.
         while scene.frame_current < step.frame:
             self._tick()
@@ -112,11 +160,24 @@ class Player:
         self.keys += bones * count
 
     def _restore(self, _step: ScriptStep) -> None:
-        self._hand = None
+        self._hands.clear()
+        self._ways.clear()
         self._session.restore()
 
+    def _drop(self, hand: _Hand) -> None:
+        """A hand is on no way any more."""
+        self._ways = [each for each in self._ways if each.hand is not hand]
+
+    def _forget_lost(self) -> None:
+        """Hands that a change of frame has taken the puppet out of hold nothing."""
+        held = self._session.core.world.grabs
+        self._hands = {name: each for name, each in self._hands.items() if each.spring in held}
+        self._ways = [each for each in self._ways if each.hand.spring in held]
+
     def _tick(self) -> None:
-        self._session.tick(TICK, self._hand, self._turn)
+        self._ways = [each for each in self._ways if not each.go_on()]
+        hands = {each.spring: (each.place, each.turn) for each in self._hands.values()}
+        self._session.tick(TICK, hands=hands)
         if not self._session.recording:
             return
         # The scene plays at its own rate.
@@ -138,7 +199,7 @@ def apply_settings(armature: bpy.types.Object, values: Any) -> None:
     settings: Any = posing_settings(armature)
     for name, value in values.items():
         definition = settings.bl_rna.properties.get(name)
-        if definition is None or definition.type == "POINTER" or name == "obstacle":
+        if definition is None or definition.type == "POINTER" or name in _OF_OBJECTS:
             raise SettingsError(
                 phrase("There is no setting '{name}' of posing.", name=name), "Check its name."
             )
@@ -153,6 +214,27 @@ def apply_settings(armature: bpy.types.Object, values: Any) -> None:
                 ),
                 "See the scripting reference.",
             ) from None
+
+
+def _figure(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
+    """Another armature of the scene.
+
+    Raises:
+        SettingsError: there is none.
+    """
+    found = next((each for each in scene.objects if each.name == name), None)
+    if found is None or found.type != "ARMATURE":
+        raise SettingsError(
+            phrase(
+                "The script poses '{name}' along, and the scene has no such armature.", name=name
+            ),
+            "Correct its name in the script.",
+        )
+    return found
+
+
+_OF_OBJECTS: Final = frozenset({"obstacle", "moves", "mass"})
+"""Settings that count on other objects than armatures."""
 
 
 def play_file(armature: bpy.types.Object, scene: bpy.types.Scene, path: Path) -> Player:
@@ -174,7 +256,8 @@ def play_file(armature: bpy.types.Object, scene: bpy.types.Scene, path: Path) ->
     try:
         apply_settings(armature, script.settings)
         frame, subframe = scene.frame_current, scene.frame_subframe
-        session = PuppetSession(armature, scene, clock=None)
+        others = [_figure(scene, name) for name in script.figures]
+        session = PuppetSession(armature, scene, clock=None, partners=others)
         player = Player(session, script)
         try:
             player.play()

@@ -17,7 +17,7 @@ from ...blender.rig import (
     is_part_of,
     set_bone_material,
 )
-from ...blender.scene import read_obstacle
+from ...blender.scene import Company, read_obstacle
 from ...core.posing.puppet import Elements, Figure, JointCoefficients, Material, elements_for
 from ...core.posing.session import Session
 from ...core.posing.solver import Obstacle, Plane
@@ -76,13 +76,14 @@ class SessionSettings(SimpleNamespace):
         """Of the joints; some bodies may have a material of their own."""
         return elements_for(figure, *self.joints, own=own)
 
-    def obstacles(self, puppet: Puppet, scene: bpy.types.Scene) -> list[Obstacle]:
-        """What the puppet can touch.
+    def obstacles(self, company: Company, scene: bpy.types.Scene) -> list[Obstacle]:
+        """What the puppet can touch, shapes of what it can push about among them.
 
         Raises:
             RigError: an obstacle is damaged.
         """
-        unit, armature = puppet.rig.unit, puppet.found()
+        unit, armatures = company.rig.unit, company.armatures()
+        loose = {each.found() for each in company.things}
         obstacles: list[Obstacle] = []
         if self.floor:
             obstacles.append(Plane(position=np.array([0.0, 0.0, self.floor_height * unit])))
@@ -90,19 +91,19 @@ class SessionSettings(SimpleNamespace):
         obstacles += [
             read_obstacle(item, kind, unit)
             for item, kind in marked
-            if not is_part_of(item, armature)
+            if item not in loose and not any(is_part_of(item, each) for each in armatures)
         ]
-        return obstacles
+        return obstacles + company.shapes()
 
-    def hold_root(self, puppet: Puppet, session: Session) -> None:
-        """Pin the roots, or free those that nothing locks."""
-        pose = puppet.armature().pose
+    def hold_root(self, puppet: Puppet, session: Session, first: int = 0) -> None:
+        """Pin a puppet's roots, or free those that nothing locks; its bodies begin with a first."""
+        pose, figure = puppet.armature().pose, puppet.figure
         assert pose is not None
-        for body, parent in enumerate(session.figure.parents):
+        for body, parent in enumerate(figure.parents):
             if parent < 0:
-                locked = all(np.array(pose.bones[session.figure.names[body]].lock_location))
+                locked = all(np.array(pose.bones[figure.names[body]].lock_location))
                 free = self.root == "FREE" and not locked
-                session.pin(body, state=not free, firm=self.root == "HELD")
+                session.pin(first + body, state=not free, firm=self.root == "HELD")
 
 
 class BoneMaterials:
