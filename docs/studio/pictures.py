@@ -18,6 +18,7 @@ import grounds
 import numpy as np
 import plot
 import puppet_curves
+import puppet_things
 import puppets
 import reaching
 import setups
@@ -160,6 +161,7 @@ PICTURES: Final[dict[str, Callable[[], Pixels]]] = {
     "mouth": reaching.mouth,
     "pose_octopus": puppets.octopus,
     "pose_doll": puppets.doll,
+    "pose_things": puppet_things.sheet,
     "puppet_plots": puppet_plots,
     "splices": splices,
 }
