@@ -234,7 +234,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         min=0.0,
         soft_max=1000.0,
         precision=2,
-        unit="MASS",
     )
 
 
