@@ -373,7 +373,81 @@ class KeyedPuppet(PosedPuppet):
         return done + self.companions.insert(wanted, frame, auto=auto, all_bones=all_bones)
 
 
-class PuppetSession(KeyedPuppet):
+class RecordedPuppet(KeyedPuppet):
+    """A puppet whose drags can be recorded while the frames go by."""
+
+    _recording: Recording | None = None
+
+    @property
+    def recording(self) -> bool:
+        """Whether the motion of the drag is kept while the frames go by."""
+        return self._recording is not None
+
+    def toggle_record(self) -> str:
+        """Begin to record, or write what was recorded; what was done, in words.
+
+        Raises:
+            WriteError: a motion cannot be written.
+        """
+        if self.recording:
+            bones, frames = self.stop_record()
+            return phrase(
+                "Recorded {bones} on {frames}",
+                bones=_bones(bones),
+                frames=_key_frames(frames),
+            )
+        self.record()
+        return phrase("Recording while the frames go by: play, and drag")
+
+    def record(self) -> None:
+        """Begin to keep the pose at each frame, from this one on.
+
+        Raises:
+            WriteError: a motion could not be written.
+        """
+        self.keys.check_motion(self.puppet.armature())
+        self.companions.check_motion()
+        frame, pose = self.scene().frame_current_final, self.core.pose
+        self._recording = Recording(self.puppet.main, frame, self._own(pose))
+        self.companions.record(frame, pose)
+
+    def _own(self, pose: Pose) -> Pose:
+        return part_of_pose(pose, self.puppet.own)
+
+    def stop_record(self) -> tuple[int, int]:
+        """Write what was kept as few keys; number of bones and of key frames."""
+        recording, self._recording = self._recording, None
+        if recording is None:
+            return 0, 0
+        with pose_kept(self.puppet.armature()):
+            bones, count = recording.write(self.keys)
+        others = self.companions.write_motion()
+        if (recording.go_along(bones) or others) and bpy.context.view_layer is not None:
+            bpy.context.view_layer.update()
+            self._adopt()
+        return len(bones) + others, count
+
+    def _adopt(self) -> None:
+        """Go on from what the armature shows."""
+        self.puppet.forget()
+        self.core.adopt(self.puppet.read())
+
+    def _record_frame(self, recording: Recording, frame: float) -> None:
+        if recording.is_past(frame):
+            # Playback has come round, or someone has gone back: the take is complete.
+            self._recording = None
+            bones, _ = recording.write(self.keys)
+            recording.go_along(bones)
+            self.companions.write_motion()
+            self.core.adopt(self.puppet.read())
+            return
+        pose = self.core.pose
+        self.puppet.write(pose)
+        recording.keep(frame, self._own(pose))
+        self.companions.keep(frame, pose)
+
+
+class PuppetSession(RecordedPuppet):
     """An armature in a hand, from start to end; without a clock it is repeatable.
 
     Raises:
@@ -398,7 +472,6 @@ class PuppetSession(KeyedPuppet):
         super().__init__(armature, scene, clock, partners)
         self._values = pose_values(armature)
         self._frame = self._started = scene.frame_current_final
-        self._recording: Recording | None = None
         self.ended = False
         """Whether it is over."""
         self.report: TickReport | None = None
@@ -495,57 +568,6 @@ class PuppetSession(KeyedPuppet):
             )
         self.core.release()
         self.measuring = MeasuringHand(self.figure, self.core.pose, body)
-
-    # --- Keys -----------------------------------------------------------------------------------
-
-    @property
-    def recording(self) -> bool:
-        """Whether the motion of the drag is kept while the frames go by."""
-        return self._recording is not None
-
-    def toggle_record(self) -> str:
-        """Begin to record, or write what was recorded; what was done, in words.
-
-        Raises:
-            WriteError: a motion cannot be written.
-        """
-        if self.recording:
-            bones, frames = self.stop_record()
-            return phrase(
-                "Recorded {bones} on {frames}",
-                bones=_bones(bones),
-                frames=_key_frames(frames),
-            )
-        self.record()
-        return phrase("Recording while the frames go by: play, and drag")
-
-    def record(self) -> None:
-        """Begin to keep the pose at each frame, from this one on.
-
-        Raises:
-            WriteError: a motion could not be written.
-        """
-        self.keys.check_motion(self.puppet.armature())
-        self.companions.check_motion()
-        frame, pose = self.scene().frame_current_final, self.core.pose
-        self._recording = Recording(self.puppet.main, frame, self._own(pose))
-        self.companions.record(frame, pose)
-
-    def _own(self, pose: Pose) -> Pose:
-        return part_of_pose(pose, self.puppet.own)
-
-    def stop_record(self) -> tuple[int, int]:
-        """Write what was kept as few keys; number of bones and of key frames."""
-        recording, self._recording = self._recording, None
-        if recording is None:
-            return 0, 0
-        with pose_kept(self.puppet.armature()):
-            bones, count = recording.write(self.keys)
-        others = self.companions.write_motion()
-        if (recording.go_along(bones) or others) and bpy.context.view_layer is not None:
-            bpy.context.view_layer.update()
-            self._adopt()
-        return len(bones) + others, count
 
     # --- Ends -----------------------------------------------------------------------------------
 
@@ -660,25 +682,6 @@ class PuppetSession(KeyedPuppet):
             self._trouble = error
         if self.settings.use_obstacles:
             self.see_obstacles()
-
-    def _adopt(self) -> None:
-        """Go on from what the armature shows."""
-        self.puppet.forget()
-        self.core.adopt(self.puppet.read())
-
-    def _record_frame(self, recording: Recording, frame: float) -> None:
-        if recording.is_past(frame):
-            # Playback has come round, or someone has gone back: the take is complete.
-            self._recording = None
-            bones, _ = recording.write(self.keys)
-            recording.go_along(bones)
-            self.companions.write_motion()
-            self.core.adopt(self.puppet.read())
-            return
-        pose = self.core.pose
-        self.puppet.write(pose)
-        recording.keep(frame, self._own(pose))
-        self.companions.keep(frame, pose)
 
 
 def _bones_and_things(bones: int, things: int) -> str:
