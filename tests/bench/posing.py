@@ -31,7 +31,7 @@ from octo_motion.core.posing.session import hand_for
 from octo_motion.core.posing.solver.obstacle_shapes import Box, Plane, Sphere
 from octo_motion.core.posing.solver.world import World, WorldSettings
 from octo_motion.core.rotations import Floats
-from tests.core.puppets import Torn, doll, octopus, posed, soft, torn, tree
+from tests.core.puppets import Torn, chain, doll, octopus, posed, soft, torn, tree
 
 _HIGH: Final = 0.12
 """Metres from which a figure falls."""
@@ -97,7 +97,24 @@ def _steps(steps: int) -> list[dict[str, Any]]:
     rows: list[Measured] = []
     for name, figure in figures.items():
         rows += _ours(name, figure, steps)
+    rows += [_dragged_chain(count, steps) for count in (100, 200)]
     return [asdict(row) for row in rows + _mujoco(figures, steps)]
+
+
+def _dragged_chain(count: int, steps: int) -> Measured:
+    """A chain of clay, held at one end and led about at the other."""
+    figure = chain(count, 1.5 / count, 0.3 / count)
+    figure = replace(figure, elements=elements_for(figure, "clay"))
+    world = World(figure, posed(figure), WorldSettings())
+    world.pin(0)
+    start = world.pose().positions[-1]
+    grab = world.grab(count - 1, start)
+
+    def drag(number: int) -> None:
+        angle = 2.0 * np.pi * number / 2000.0
+        grab.pull(start + np.array([0.3 * np.sin(angle), 0.3 * np.cos(angle) - 0.3, 0.1]))
+
+    return _timed(world, f"chain of {count}, dragged", steps, drag)
 
 
 def _doll() -> Figure:

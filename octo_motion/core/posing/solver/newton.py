@@ -111,7 +111,6 @@ class Newton:
         self._joint_right = np.zeros((slots, 3))
         self._slopes: Floats | None = None
         self._pattern: Pattern | None = None
-        self._wide = tree.beyond
         self._maps = tuple(_with_columns(columns) for columns in (1, 2))
 
     def solve(
@@ -232,12 +231,12 @@ class Newton:
         np.matmul(problem.moments, self._maps[columns - 1], out=flat[:bodies])
         stack[:bodies, :, 6:] = problem.momenta[:, :, None]
         if rows.pattern is not self._pattern:
-            beyond = self._tree.beyond
-            chain = beyond[:, rows.bodies]
+            onto = np.zeros((bodies, len(rows.bodies)))
+            onto[rows.bodies, np.arange(len(rows.bodies))] = 1.0
             # A push between two bodies of the figure is taken from the other one. Its stiffness is
             # not here, see ``_with_pairs``.
-            chain[:, rows.paired] -= beyond[:, rows.others[rows.paired]]
-            self._wide = np.concatenate([beyond, chain], axis=1)
+            onto[rows.others[rows.paired], rows.paired] -= 1.0
+            self._tree.use_rows(onto)
             self._pattern = rows.pattern
         return stack
 
@@ -253,17 +252,17 @@ class Newton:
                 _lowered(rows, planes, corrections, stack.shape[2] - 6),
                 out=stack[bodies:],
             )
-        summed = self._wide @ stack.reshape(len(stack), -1)
-        both = tree.motion @ summed.reshape(len(summed), 6, -1)
         if tangents.slopes is not self._slopes:
             self._slopes = tangents.slopes
             self._joint_blocks[tree.joint_slot] = tangents.slopes
         self._joint_right[tree.joint_slot] = tangents.right
-        right = both[:, :, 6:] + self._joint_right[:, :, None]
-        tree.assemble(both[:, :, :6], self._joint_blocks)
+        right = tree.fill(stack, self._joint_blocks)
+        right[: 3 * len(self._joint_right)] += self._joint_right.reshape(-1, 1)
         if planes is not None and len(rows.paired):
-            return self._with_pairs(problem, planes, right)
-        return tree.solve(right)
+            solved = self._with_pairs(problem, planes, right)
+        else:
+            solved = tree.solve_all(right)
+        return solved[: 3 * len(self._joint_right)].reshape(-1, 3, right.shape[1])
 
     def _with_pairs(self, problem: Problem, tangent: Tangent, right: Floats) -> Floats:
         """The solution with contacts between bodies of the figure.
@@ -277,22 +276,18 @@ class Newton:
         loaded = slopes.any(axis=(1, 2))
         paired, slopes = paired[loaded], slopes[loaded]
         if not len(paired):
-            return tree.solve(right)
-        count, columns = len(paired), right.shape[-1]
-        # (slots, 3, 3 count): Sᵀ Xᵀ, with a sign for which of the two bodies a slot moves.
-        signs = self._wide[:, len(problem.masses) + paired]
+            return tree.solve_all(right)
+        count = len(paired)
+        # (unknowns, 3 count): Sᵀ Xᵀ, with a sign for which of the two bodies a slot moves.
         wide = rows.reach[paired].transpose(2, 0, 1).reshape(6, 3 * count)
-        spread = tree.motion @ wide
-        spread *= np.repeat(signs, 3, axis=1)[:, None, :]
-        both = tree.solve(np.concatenate([spread, right], axis=2))
-        flat = spread.reshape(-1, 3 * count)
-        response = flat.T @ both.reshape(len(flat), -1)
+        spread = tree.spread(wide, np.repeat(tree.moved[:, paired], 3, axis=1))
+        both = tree.solve_all(np.concatenate([spread, right], axis=1))
+        response = spread.T @ both
         weighted = (slopes @ response.reshape(count, 3, -1)).reshape(3 * count, -1)
         inner = weighted[:, : 3 * count].copy()
         inner[np.arange(3 * count), np.arange(3 * count)] += 1.0
         pull = np.linalg.solve(inner, weighted[:, 3 * count :])
-        result = both[:, :, 3 * count :] - both[:, :, : 3 * count] @ pull
-        return result.reshape(-1, 3, columns)
+        return both[:, 3 * count :] - both[:, : 3 * count] @ pull
 
     def _lowest(
         self,

@@ -51,7 +51,8 @@ class Layout:
 class Tree:
     """Equations (1) of one figure: built once, filled and solved every step."""
 
-    def __init__(self, figure: Figure) -> None:
+    def __init__(self, figure: Figure, layout: Layout | None = None) -> None:
+        """By the cheapest plan, if none is given."""
         self.parents = np.array(figure.parents, dtype=np.int64)
         count = len(self.parents)
         if np.any(self.parents >= np.arange(count)):
@@ -62,7 +63,8 @@ class Tree:
             if parent >= 0:
                 self.above[body] += self.above[parent]
         self.roots = np.flatnonzero(self.parents < 0)
-        self.use(plan(self.parents, self.above))
+        self.use(layout or plan(self.parents, self.above))
+        self.use_rows(np.zeros((count, 0)))
 
     def use(self, layout: Layout) -> None:
         """Solve by this plan; any plan that covers the figure gives the same solutions."""
@@ -131,6 +133,42 @@ class Tree:
         at *= self._minus_joint
         np.add(skew(at), self._fixed, out=self.motion[:, :, 3:])
 
+    @property
+    def cost(self) -> float:
+        """Microseconds of a solution, about."""
+        layout = self.layout
+        return solving_cost(layout.trunk, [layout.width] * layout.branches)
+
+    def use_rows(self, onto: Floats) -> None:
+        """From now on rows act on bodies as (bodies, rows) says, 1, −1 or 0."""
+        self.moved: Floats = self.beyond @ onto
+        """(slots, rows) by which a slot moves a row."""
+        self._wide = np.concatenate([self.beyond, self.moved], axis=1)
+
+    def fill(self, stack: Floats, joints: Floats) -> Floats:
+        """Fill the matrix of (1), and get its right side (unknowns, columns) but for the joints'.
+
+        ``stack`` (bodies and rows, 6, 6 + columns) has inertias and beside them momenta; ``joints``
+        (slots, 3, 3) is K, which stands on each slot's own block.
+        """
+        summed = self._wide @ stack.reshape(len(stack), -1)
+        both = self.motion @ summed.reshape(len(summed), 6, -1)
+        self.assemble(both[:, :, :6], joints)
+        return both[:, :, 6:].reshape(-1, stack.shape[2] - 6)
+
+    def spread(self, wide: Floats, signs: Floats) -> Floats:
+        """(unknowns, columns) of impulses (6, columns), each with the sign by which a slot
+        (slots, columns) moves it.
+        """
+        turned = self.motion @ wide
+        turned *= signs[:, None, :]
+        return turned.reshape(-1, wide.shape[1])
+
+    def solve_all(self, right: Floats) -> Floats:
+        """Solution of (1), all unknowns (unknowns, columns); the slots' come first."""
+        columns = right.shape[1]
+        return self.solve(right.reshape(-1, 3, columns)).reshape(-1, columns)
+
     def velocities(self, speeds: Floats) -> Floats:
         """V (bodies, 6) of u (slots, 3)."""
         return self.chain @ (speeds[:, None, :] @ self.motion)[:, 0, :]
@@ -184,12 +222,12 @@ def plan(parents: Integers, above: Floats) -> Layout:
     count = len(parents)
     sizes = above.sum(axis=0)
     roots = np.flatnonzero(parents < 0)
-    best: tuple[float, list[list[int]]] = (_cost(len(roots) + count, []), [])
+    best: tuple[float, list[list[int]]] = (solving_cost(len(roots) + count, []), [])
     for limit in np.unique(sizes):
         small = sizes <= limit
         tops = [b for b in range(count) if small[b] and (parents[b] < 0 or not small[parents[b]])]
         groups = [np.flatnonzero(above[:, top]).tolist() for top in tops]
-        cost = _cost(len(roots) + int((~small).sum()), [len(group) for group in groups])
+        cost = solving_cost(len(roots) + int((~small).sum()), [len(group) for group in groups])
         if cost < best[0]:
             best = (cost, groups)
     groups = best[1]
@@ -204,7 +242,7 @@ def plan(parents: Integers, above: Floats) -> Layout:
     return Layout(trunk, len(groups), width, np.array(bodies), np.array(shifts))
 
 
-def _cost(trunk: int, sizes: list[int]) -> float:
+def solving_cost(trunk: int, sizes: list[int]) -> float:
     """Microseconds of a solution, about; measured with numpy's OpenBLAS on one core."""
     whole = 8.0 + 0.6 * trunk + 2.0e-2 * (0.3 * trunk) ** 3
     if not sizes:

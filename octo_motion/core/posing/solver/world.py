@@ -30,7 +30,7 @@ from .holds import Coupling, HandSpring, Hold, HoldBuilder
 from .newton import InitialGuess, Newton, Solution
 from .obstacle_shapes import Obstacle
 from .problem import Problem, ProblemBuilder, typical_size
-from .tree import Tree
+from .segments import tree_of
 from .warm_start import WarmStart
 
 _WEIGHT = 9.81
@@ -111,7 +111,7 @@ class World:
         settings.check(figure)
         # Limbs of two figures that are in each other from the start would be thrown apart.
         self._apart = apart_at(figure, pose) | _same(figure) if figure.owners else None
-        self._tree = Tree(figure)
+        self._tree = tree_of(figure)
         self._bodies = Bodies(figure, self._tree, pose)
         self._warm = WarmStart(self._tree)
         self._loads = np.zeros((len(figure), 3))

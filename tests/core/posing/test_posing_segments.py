@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Long chains, solved in segments: the same answers as of one system, in time that grows evenly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from octo_motion.core.posing.puppet import Figure, elements_for
+from octo_motion.core.posing.solver import Plane, World, WorldSettings
+from octo_motion.core.posing.solver.segments import SegmentedTree, cut_at, tree_of
+from octo_motion.core.posing.solver.tree import Tree
+from octo_motion.core.rotations import Floats
+from tests.core.puppets import chain, doll, octopus, posed, puppet
+
+
+def comb(teeth: int = 12, length: int = 4) -> Figure:
+    """A chain from each second link of which another one hangs."""
+    parents = list(range(-1, 2 * teeth - 1))
+    anchors = [[0.0, 0.0, 0.0]] + [[0.0, 0.1, 0.0]] * (2 * teeth - 1)
+    for tooth in range(teeth):
+        at = 2 * tooth
+        for number in range(length):
+            parents.append(at if number == 0 else len(parents) - 1)
+            anchors.append([0.05, 0.0, 0.02] if number == 0 else [0.0, 0.1, 0.0])
+    count = len(parents)
+    order = np.random.default_rng(3).uniform(0.06, 0.12, count)
+    return puppet(parents, anchors, order.tolist(), [0.03] * count)
+
+
+def two_chains() -> Figure:
+    """Of two roots: what is in no tree with the other is in no segment with it."""
+    parents = [*range(-1, 29), -1, *range(30, 59)]
+    anchors = [[0.0, 0.0, 0.0] if parent < 0 else [0.0, 0.1, 0.0] for parent in parents]
+    return puppet(parents, anchors, [0.1] * 60, [0.02] * 60)
+
+
+FIGURES = {"chain": chain(100), "comb": comb(), "two chains": two_chains(), "doll": doll()}
+
+
+@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize("size", [3, 7])
+def test_segments_have_the_solution_of_one_system(name: str, size: int) -> None:
+    figure, chance = FIGURES[name], np.random.default_rng(5)
+    count = len(figure)
+    whole, cut = Tree(figure), SegmentedTree(figure, cut_at(figure.parents, size))
+    onto = np.zeros((count, 4))
+    onto[chance.integers(0, count, 4), np.arange(4)] = 1.0
+    onto[2, 3] -= 1.0
+    inertias = chance.normal(size=(count + 4, 6, 6))
+    inertias = inertias @ inertias.transpose(0, 2, 1) + 0.1 * np.eye(6)
+    inertias[-4:] *= 0.01
+    stack = np.concatenate([inertias, chance.normal(size=(count + 4, 6, 2))], axis=2)
+    blocks = chance.normal(size=(count, 3, 3))
+    blocks = blocks @ blocks.transpose(0, 2, 1)
+    # Joints without any resistance, in a row, are the hardest.
+    blocks[count // 2 :] = 0.0
+    points = chance.normal(size=(count, 3))
+    answers: list[Floats] = []
+    for tree in (whole, cut):
+        tree.place(points)
+        tree.use_rows(onto)
+        joints = np.zeros((len(tree.layout.bodies), 3, 3))
+        joints[tree.joint_slot] = blocks
+        right = tree.fill(stack, joints)
+        solved = tree.solve_all(right)
+        slots = len(tree.layout.bodies)
+        speeds = solved[: 3 * slots, 0].reshape(slots, 3)
+        pulled = tree.spread(np.eye(6)[:, :2], np.repeat(tree.moved[:, [1, 3]], [1, 1], axis=1))
+        both = tree.solve_all(pulled)
+        answers.append(np.concatenate([tree.velocities(speeds).ravel(), (pulled.T @ both).ravel()]))
+    most = np.abs(answers[0]).max()
+    # Measured: 4e-12.
+    assert np.abs(answers[1] - answers[0]).max() < 1e-9 * most
+
+
+def test_a_long_chain_moves_as_one_system_has_it() -> None:
+    """Pinned at one end, pulled at the other over a floor, with joints that give way."""
+    figure = chain(60, 0.05, 0.02)
+    figure = chain(60, 0.05, 0.02, elements=elements_for(figure, "clay"))
+    ends: list[Floats] = []
+    for segmented in (False, True):
+        settings = WorldSettings(step=2e-3, gravity=(0.0, 0.0, -9.81))
+        world = World(figure, posed(figure, at=(0.0, 0.0, 0.03)), settings, [Plane()])
+        if segmented:
+            world._tree = SegmentedTree(figure, cut_at(figure.parents, 9))
+            world._bodies._tree = world._warm._tree = world._tree
+            world._warm.forget()
+            world.change(WorldSettings(step=2e-3, gravity=(0.0, 0.0, -9.8100001)))
+            world.change(settings)
+        else:
+            world._tree = Tree(figure)
+            world._bodies._tree = world._warm._tree = world._tree
+            world._warm.forget()
+            world._use(settings)
+        world.pin(0)
+        at = world.pose().positions[-1]
+        spring = world.grab(59, at)
+        for number in range(60):
+            spring.pull(at + np.array([0.004 * number, -0.001 * number, 0.002 * number]))
+            world.step()
+        ends.append(np.concatenate([world.pose().positions, world.velocities()[:, :3]], axis=1))
+    assert np.abs(ends[0][:, :3] - ends[0][0, :3]).max() > 0.1
+    # Rounding, and what a pose makes of it in 60 steps.
+    assert np.abs(ends[1] - ends[0]).max() < 1e-9
+
+
+def test_segments_are_taken_where_they_are_quicker() -> None:
+    for short in (doll(), octopus(), chain(20)):
+        assert not isinstance(tree_of(short), SegmentedTree)
+    for count in (100, 200):
+        found = tree_of(chain(count))
+        assert isinstance(found, SegmentedTree)
+        # As much again for twice the length, not eight times.
+        assert found.segments.width <= 16
+    assert tree_of(chain(200)).cost < 2.6 * tree_of(chain(100)).cost
+
+
+def test_every_body_is_in_one_segment_that_hangs_together() -> None:
+    for figure in FIGURES.values():
+        cut = cut_at(figure.parents, 6)
+        assert sorted(body for each in cut.bodies for body in each) == list(range(len(figure)))
+        for bodies in cut.bodies:
+            assert all(figure.parents[body] in bodies for body in bodies[1:])
