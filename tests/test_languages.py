@@ -40,11 +40,13 @@ def test_blender_finds_a_text_wherever_it_looks_for_it(name: str) -> None:
     assert found == {
         ("*", "Splice"): "a",
         ("Operator", "Splice"): "a",
+        ("Octo Motion", "Splice"): "a",
         ("*", "Move"): "b",
         ("Operator", "Move"): "c",
+        ("Octo Motion", "Move"): "b",
     }
     known = language.blender_texts(texts.catalogue(name))
-    assert {context for context, _ in known} == {"*", "Operator"}
+    assert {context for context, _ in known} == {"*", "Operator", "Octo Motion"}
 
 
 def test_texts_that_are_registered_drawn_and_reported_are_all_found() -> None:
@@ -114,8 +116,8 @@ def test_what_comes_out_is_in_the_language_of_blender(monkeypatch: pytest.Monkey
 
     class Translations:
         @staticmethod
-        def look_up(text: str, _context: str | None = None) -> str:
-            return known.get(("*", text), text)
+        def look_up(text: str, context: str) -> str:
+            return known.get((context, text), text)
 
         pgettext_iface = pgettext_rpt = pgettext_tip = look_up
 
@@ -135,7 +137,7 @@ def test_what_comes_out_is_in_the_language_of_blender(monkeypatch: pytest.Monkey
         def run(self, context: bpy.types.Context) -> None:
             from octo_motion.blender.rig import armature_data
 
-            armature_data(context.object)
+            armature_data(cast("Any", context.object))
 
     assert Refusing().execute(bpy.context) == {"CANCELLED"}
     name = cast("Any", bpy.context.object).name

@@ -15,18 +15,35 @@ from bpy import props
 
 from ..blender.rig import linked_names
 from ..core.settings import Setting, declared_settings
+from .language import OWN
 
-BoolProperty: Final = partial(props.BoolProperty, override={"LIBRARY_OVERRIDABLE"})
-EnumProperty: Final = partial(props.EnumProperty, override={"LIBRARY_OVERRIDABLE"})
-FloatProperty: Final = partial(props.FloatProperty, override={"LIBRARY_OVERRIDABLE"})
-FloatVectorProperty: Final = partial(props.FloatVectorProperty, override={"LIBRARY_OVERRIDABLE"})
+BoolProperty: Final = partial(
+    props.BoolProperty, override={"LIBRARY_OVERRIDABLE"}, translation_context=OWN
+)
+EnumProperty: Final = partial(
+    props.EnumProperty, override={"LIBRARY_OVERRIDABLE"}, translation_context=OWN
+)
+FloatProperty: Final = partial(
+    props.FloatProperty, override={"LIBRARY_OVERRIDABLE"}, translation_context=OWN
+)
+FloatVectorProperty: Final = partial(
+    props.FloatVectorProperty, override={"LIBRARY_OVERRIDABLE"}, translation_context=OWN
+)
 AngleProperty: Final = partial(FloatProperty, subtype="ANGLE", step=500, precision=1)
 FactorProperty: Final = partial(FloatProperty, subtype="FACTOR", min=0.0, max=1.0)
-IntProperty: Final = partial(props.IntProperty, override={"LIBRARY_OVERRIDABLE"})
-PointerProperty: Final = partial(props.PointerProperty, override={"LIBRARY_OVERRIDABLE"})
-StringProperty: Final = partial(props.StringProperty, override={"LIBRARY_OVERRIDABLE"})
+IntProperty: Final = partial(
+    props.IntProperty, override={"LIBRARY_OVERRIDABLE"}, translation_context=OWN
+)
+PointerProperty: Final = partial(
+    props.PointerProperty, override={"LIBRARY_OVERRIDABLE"}, translation_context=OWN
+)
+StringProperty: Final = partial(
+    props.StringProperty, override={"LIBRARY_OVERRIDABLE"}, translation_context=OWN
+)
 CollectionProperty: Final = partial(
-    props.CollectionProperty, override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"}
+    props.CollectionProperty,
+    override={"LIBRARY_OVERRIDABLE", "USE_INSERTION"},
+    translation_context=OWN,
 )
 
 

@@ -22,6 +22,9 @@ ANYWHERE: Final = "*"
 """Blender's context of all texts …"""
 OPERATOR: Final = "Operator"
 """… but the labels of operators and of their buttons."""
+OWN: Final = "Octo Motion"
+"""Context of our settings and panels. In the others Blender's own words come first: there "Arm" is
+short for an armature, and "Root" is said as a route is."""
 
 Texts = dict[str, str]
 Catalogue = dict[str, Texts]
@@ -41,7 +44,7 @@ def read_catalogue(path: Path) -> Catalogue:
 def blender_texts(catalogue: Catalogue) -> dict[tuple[str, str], str]:
     """A catalogue as Blender takes it: it looks for a text in one context alone."""
     everywhere = catalogue.get(ANYWHERE, {})
-    contexts = {ANYWHERE: {}, OPERATOR: {}} | catalogue
+    contexts = {ANYWHERE: {}, OPERATOR: {}, OWN: {}} | catalogue
     return {
         (context, english): said
         for context, texts in contexts.items()
@@ -51,17 +54,17 @@ def blender_texts(catalogue: Catalogue) -> dict[tuple[str, str], str]:
 
 def translated(text: object) -> str:
     """A text, a phrase or an error for panels, menus, headers and the status bar."""
-    return phrases.told(text, bpy.app.translations.pgettext_iface)
+    return phrases.told(text, lambda english: bpy.app.translations.pgettext_iface(english, OWN))
 
 
 def reported(text: object) -> str:
     """The same for Blender's reports."""
-    return phrases.told(text, bpy.app.translations.pgettext_rpt)
+    return phrases.told(text, lambda english: bpy.app.translations.pgettext_rpt(english, OWN))
 
 
 def hinted(text: object) -> str:
     """The same for tooltips."""
-    return phrases.told(text, bpy.app.translations.pgettext_tip)
+    return phrases.told(text, lambda english: bpy.app.translations.pgettext_tip(english, OWN))
 
 
 def register() -> None:

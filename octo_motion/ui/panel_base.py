@@ -12,7 +12,7 @@ import bpy
 
 from ..blender.rig import active_armature
 from ..core.errors import RigError
-from .language import translated
+from .language import OWN, translated
 from .tool import tool_of
 
 _CHARACTER: Final = 6.5
@@ -98,6 +98,7 @@ class TabPanel:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Octo Motion"
+    bl_translation_context = OWN
 
 
 class ArmaturePanel(TabPanel):

@@ -490,7 +490,7 @@ def _draw_knots(
     column = layout.column(align=True)
     row = column.row(align=True)
     for title in (phrase("Phase"), phrase("Root"), phrase("Middle"), phrase("Tip")):
-        row.label(text=title)
+        row.label(text=translated(title))
     row.label(text="", icon="BLANK1")
     for number, knot in enumerate(used(curve.knots)):
         row = column.row(align=True)
