@@ -190,6 +190,8 @@ def described(group: str) -> dict[str, list[str]]:
             return rows(section("## Change of gait").split("An item of", 1)[0])
         case "place":
             return rows(after("An item of `places`:", "## Change of gait"))
+        case "body":
+            return rows(section("## Body"))
         case "ground":
             return rows(section("## The ground").split("An item of", 1)[0])
         case "contact":
@@ -213,8 +215,8 @@ def described(group: str) -> dict[str, list[str]]:
 
 
 def group_class(group: str) -> Any:
+    from octo_motion.ui.locomotion.settings import body, lists, properties
     from octo_motion.ui.locomotion.settings import gait as gait_properties
-    from octo_motion.ui.locomotion.settings import lists, properties
     from octo_motion.ui.locomotion.settings import lists as ground_properties
     from octo_motion.ui.locomotion.settings import properties as quality_report
     from octo_motion.ui.posing.properties import OCTO_MOTION_PG_posing
@@ -232,6 +234,7 @@ def group_class(group: str) -> Any:
         "reach": lists.ReachItem,
         "ground": ground_properties.OCTO_MOTION_PG_ground,
         "contact": ground_properties.ContactItem,
+        "body": body.OCTO_MOTION_PG_body,
         "change": lists.OCTO_MOTION_PG_change,
         "place": lists.ChangeItem,
         "landmarks": OCTO_MOTION_PG_landmarks,
@@ -296,7 +299,7 @@ def number(value: float, definition: Any) -> str:
 @pytest.mark.parametrize(
     "group",
     [
-        *("locomotion", "arm", "bone", "reach", "change", "place", "ground", "contact"),
+        *("locomotion", "arm", "bone", "reach", "change", "place", "ground", "contact", "body"),
         "figure",
         *("table", "curve", "knot", "offset", "note"),
         *("splicing", "splice", "landmarks", "posing"),

@@ -8,8 +8,9 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import bpy
 import contact_sheet
@@ -25,6 +26,7 @@ import setups
 import shots
 import stage
 import weights
+from mathutils import Vector
 from stage import Pixels
 
 import octo_motion
@@ -126,6 +128,39 @@ def rig() -> Pixels:
     return contact_sheet.joined([[below, above]])
 
 
+def body() -> Pixels:
+    """Head and mantle through a stroke: carried by the arms alone, and moving by themselves."""
+    moments = np.array([0.34, 0.42, 0.62, 0.85])
+    rows: list[list[Pixels]] = []
+    for amount in (0.0, 1.0):
+        performance = shots.perform(shots.SWIM, _CELL, partial(_by_itself, amount))
+        camera = stage.add_camera("Body")
+        assert isinstance(camera.data, bpy.types.Camera)
+        camera.data.ortho_scale = 0.62
+        pictures: list[Pixels] = []
+        for moment, frame in zip(moments, performance.at(moments), strict=True):
+            stage.go_to(frame)
+            octopus = performance.octopus
+            assert octopus.pose is not None
+            place = octopus.matrix_world @ octopus.pose.bones["head"].head
+            # Its left side, seen a little from before.
+            away = octopus.matrix_world.to_3x3() @ Vector((0.95, -0.3, 0.1))
+            stage.look(camera, -np.array(away, dtype=np.float64), _UP)
+            camera.location = place + 3.0 * away
+            told = "by itself" if amount else "carried"
+            note = f"{told}, {round(360.0 * moment)}°"
+            pictures.append(stage.render_pixels(*_CELL, note=note))
+        rows.append(pictures)
+    return contact_sheet.joined(rows)
+
+
+def _by_itself(amount: float, settings: Any) -> None:
+    """Let a body do so much by itself."""
+    settings.breathing = 0.05 * amount
+    for name in ("surge", "mantle", "siphon", "eyes", "head"):
+        setattr(settings.body, name, amount)
+
+
 def gaits() -> Pixels:
     """Curves of the presets that the source has."""
     presets = gait.gait_presets()
@@ -153,6 +188,7 @@ PICTURES: Final[dict[str, Callable[[], Pixels]]] = {
     "ground": grounds.sheet,
     "setups": setups.gallery,
     "rig": rig,
+    "body": body,
     "gaits": gaits,
     "weights": weights.strip,
     "reach": reaching.reach,

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
 
 from . import at_work, findable, language, locomotion, posing, splicing
 from .declared_settings import PointerProperty, make_overridable
-from .locomotion import OCTO_MOTION_PG_contact, OCTO_MOTION_PG_locomotion
+from .locomotion import OCTO_MOTION_PG_contact, OCTO_MOTION_PG_locomotion, keep_look, stamp
 from .posing import OCTO_MOTION_PG_posing
 from .splicing import OCTO_MOTION_PG_splicing
 from .steps import Step, do_all, menu_entry, nothing, registered, undo_all
@@ -49,6 +50,26 @@ def _before_saving(*_: object) -> None:
     for each in bpy.data.objects:
         if each.override_library is not None:
             make_overridable(each)
+    stamp(bpy.data.objects)
+
+
+@persistent
+def _after_loading(*_: object) -> None:
+    keep_look(bpy.data.objects)
+
+
+@persistent
+def _after_import(context: Any) -> None:
+    keep_look(each.id for each in context.import_items if isinstance(each.id, bpy.types.Object))
+
+
+def _handlers() -> list[tuple[Any, Any]]:
+    known = bpy.app.handlers
+    return [
+        (known.save_pre, _before_saving),
+        (known.load_post, _after_loading),
+        (known.blend_import_post, _after_import),
+    ]
 
 
 def _give_settings() -> None:
@@ -58,12 +79,14 @@ def _give_settings() -> None:
         description="Settings of Octo Motion",
         type=OCTO_MOTION_PG_object,
     )
-    bpy.app.handlers.save_pre.append(_before_saving)
+    for handlers, function in _handlers():
+        handlers.append(function)
 
 
 def _take_settings() -> None:
     """Take the settings away."""
-    bpy.app.handlers.save_pre.remove(_before_saving)
+    for handlers, function in _handlers():
+        handlers.remove(function)
     del bpy.types.Object.octo_motion  # type: ignore[attr-defined]
 
 

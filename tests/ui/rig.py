@@ -92,6 +92,13 @@ class Octopus:
         return armature
 
 
+def still(settings: Any) -> None:
+    """Let a body do nothing by itself, for tests of what it is carried to."""
+    settings.breathing = 0.0
+    for name in ("surge", "mantle", "siphon", "eyes", "head"):
+        setattr(settings.body, name, 0.0)
+
+
 def generate(armature: Any) -> Any:
     """The action that the button makes."""
     bpy.context.view_layer.objects.active = armature

@@ -41,6 +41,9 @@ def test_a_file_of_0_1_0_opens_with_all_its_settings(saved: dict[str, Any]) -> N
         item: Any = bpy.data.objects[name]
         now = dict(values(plain(item.octo_motion, without=frozenset({"as_text"}))))
         before = {path: value for path, value in values(told) if not path.endswith("/as_text")}
+        if item.type != "ARMATURE":
+            # What never walks has the defaults of now.
+            before.pop("/locomotion/breathing", None)
         assert len(before) > 150
         assert {path: now.get(path, "gone") for path in before} == before
 

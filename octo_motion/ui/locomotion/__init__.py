@@ -10,9 +10,11 @@ from .settings import (
     OCTO_MOTION_PG_contact,
     OCTO_MOTION_PG_locomotion,
     ReachItem,
+    keep_look,
     locomotion_settings,
     once_called,
     set_gait,
+    stamp,
     store,
 )
 from .writing import Summary, generate_locomotion
@@ -31,8 +33,10 @@ __all__ = [
     "ReachItem",
     "Summary",
     "generate_locomotion",
+    "keep_look",
     "locomotion_settings",
     "once_called",
     "set_gait",
+    "stamp",
     "store",
 ]

@@ -132,10 +132,37 @@ class OCTO_MOTION_PT_gait(_Panel, bpy.types.Panel):
         layout.prop(settings, "turning")
         if table.manner == "SWIM":
             layout.prop(settings, "burst")
+
+
+class OCTO_MOTION_PT_body(_Panel, bpy.types.Panel):
+    bl_label = "Body"
+    bl_parent_id = "OCTO_MOTION_PT_gait"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
+        body = settings.body
+        layout.prop(body, "surge")
         column = layout.column(align=True)
         column.prop(settings, "breathing")
         if settings.breathing > 0.0:
             column.prop(settings, "breath_time", text="Breath Time")
+        column = layout.column(align=True)
+        for name in ("mantle", "siphon", "eyes", "head"):
+            column.prop(body, name)
+        row = layout.row()
+        row.active = body.eyes > 0.0
+        row.prop(body, "look_at")
+
+
+class OCTO_MOTION_PT_body_bones(_Panel, bpy.types.Panel):
+    bl_label = "Bones"
+    bl_parent_id = "OCTO_MOTION_PT_body"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
+        armature = cast("bpy.types.Object", armature_in(bpy.context))
+        for name in ("mantle_bone", "siphon_bone", "eye_left", "eye_right"):
+            layout.prop_search(settings.body, name, armature.data, "bones")
 
 
 class OCTO_MOTION_PT_variation(_Panel, bpy.types.Panel):
@@ -266,6 +293,8 @@ CLASSES: Final = (
     OCTO_MOTION_PT_ground,
     OCTO_MOTION_PT_heading,
     OCTO_MOTION_PT_gait,
+    OCTO_MOTION_PT_body,
+    OCTO_MOTION_PT_body_bones,
     OCTO_MOTION_PT_table,
     OCTO_MOTION_PT_change,
     OCTO_MOTION_PT_variation,

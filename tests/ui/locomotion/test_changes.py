@@ -12,7 +12,7 @@ from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from tests.blender.test_ground import make_mesh
 from tests.ui.locomotion.test_quality_report import measured_joints, played_joints
 from tests.ui.made import prepare
-from tests.ui.rig import click
+from tests.ui.rig import click, still
 
 RISING = {"b0": (-2.5, 0, 0), "b1": (-0.5, 0, -0.1), "b2": (-0.2, 0.3, 0.1), "b3": (2.2, 0, 1.6)}
 HUMP = {"b0": (-3.0, 0, 0), "b1": (-1.0, 0, 2.2), "b2": (1.0, 0, 2.2), "b3": (3.0, 0, 0)}
@@ -127,6 +127,7 @@ def test_journey_that_comes_back_to_its_first_gait_ends_as_it_began(settings: An
 def test_mantle_is_stretched_out_only_where_it_swims(settings: Any) -> None:
     bpy.ops.octo_motion.add_route(**RISING)
     settings.change.by = "HEIGHT"
+    still(settings)
     assert click("generate_locomotion") == {"FINISHED"}
     bone = settings.id_data.pose.bones["mantle"]
     scene = bpy.context.scene

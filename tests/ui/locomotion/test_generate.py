@@ -30,6 +30,7 @@ from tests.ui.rig import (
     keys,
     make_octopus,
     scene_contents,
+    still,
 )
 from tests.ui.test_panels import Layout
 
@@ -121,6 +122,7 @@ def test_swimming_stretches_head_and_mantle_and_walking_lets_them_back() -> None
     octopus: Any = bpy.context.object
     give_route(octopus)
     settings = settings_of(octopus)
+    still(settings)
     settings.timing, settings.frame_end = "RANGE", 5
 
     def lean() -> float:

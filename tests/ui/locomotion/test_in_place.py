@@ -12,7 +12,7 @@ from octo_motion.core.locomotion.gait.table import gait_presets
 from octo_motion.core.locomotion.metrics import report as quality
 from octo_motion.core.locomotion.path.travel import plan_travel
 from tests.ui.made import prepare
-from tests.ui.rig import Octopus, generate, joints_in_world, keys
+from tests.ui.rig import Octopus, generate, joints_in_world, keys, still
 
 OCTOPUS = Octopus(settings={"travel_on": "NONE", "cycle_time": 1.0})
 """It has no route."""
@@ -48,6 +48,7 @@ def test_the_last_frame_meets_the_first(octopus: Any, gait: str, how: str) -> No
 
 def test_nothing_travels_and_the_root_bone_lifts_the_body(octopus: Any) -> None:
     octopus.location = (3.0, 2.0, 1.0)
+    octopus.octo_motion.locomotion.body.surge = 0.0  # which moves it about its place
     bpy.context.view_layer.update()
     action = generate(octopus)
     assert not any(path in {"location", "rotation_euler"} for path, _ in keys(action))
@@ -84,11 +85,13 @@ def test_the_mantle_breathes() -> None:
     octopus: Any = bpy.context.object
     settings = octopus.octo_motion.locomotion
     settings.travel_on, settings.gait, settings.cycle_time = "NONE", "idle", 4.0
+    still(settings)
     assert not any("scale" in path for path, _ in keys(generate(octopus)))
     settings.breathing, settings.breath_time = 0.1, 1.8
     found = keys(generate(octopus))
     wide = found['pose.bones["mantle"].scale', 0][:, 1]
-    assert wide.max() == pytest.approx(1.1, abs=1e-3)
+    # No breath is as deep as the other: by a quarter at most.
+    assert wide.max() == pytest.approx(1.1, abs=0.026)
     assert wide[0] == pytest.approx(wide[-1], abs=1e-6)
     peaks = (wide[1:-1] > wide[:-2]) & (wide[1:-1] >= wide[2:])
     assert peaks.sum() == 2

@@ -22,6 +22,7 @@ from tests.ui.rig import (
     joints_in_world,
     keys,
     scene_contents,
+    still,
 )
 from tests.ui.test_panels import Layout
 
@@ -206,6 +207,7 @@ def test_the_mantle_of_a_swimmer_has_two_keys() -> None:
     octopus: Any = bpy.context.object
     give_route(octopus)
     settings = settings_of(octopus)
+    still(settings)
     settings.gait, settings.keys = "swim", "REDUCED"
     settings.timing, settings.frame_end = "RANGE", 60
     action = generate(octopus)

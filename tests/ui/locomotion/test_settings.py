@@ -36,7 +36,7 @@ NAMES = {
     *("travel_on", "extend_scene_range", "keys", "key_angle", "key_distance", "key_columns"),
     *("result", "figures", "live", "live_error", "keep_apart", "tell_overlaps", "show_targets"),
     *("reaches", "active_reach", "cycles", "repeat", "breathing", "breath_time"),
-    *("setup", "extended_from", "extended_to"),
+    *("setup", "extended_from", "extended_to", "body"),
 }
 
 

@@ -2,6 +2,7 @@
 """The whole motion, worked out on plain arrays: MotionJob → compute → MotionResult."""
 
 from .job import (
+    BodyJob,
     Breathing,
     ChangeAt,
     ChangesByHeight,
@@ -26,6 +27,7 @@ from .planning import (
 
 __all__ = [
     "MISS",
+    "BodyJob",
     "Breathing",
     "ChangeAt",
     "ChangesByHeight",

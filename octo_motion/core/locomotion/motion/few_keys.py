@@ -46,6 +46,9 @@ class Motion:
     arms: Sequence[Channel]
     """Rotations of the arms' bones, one arm after the other."""
     mantle: Sequence[Channel]
+    """Rotations of the body's bones that move by themselves …"""
+    widths: Sequence[Channel] = ()
+    """… and scales."""
     stretch: Sequence[Channel] = ()
     """Scales of the arms' bones that stretch."""
     lying: Sequence[np.ndarray] = ()
@@ -92,9 +95,10 @@ def reduced(
         lying = motion.lying[number] if motion.lying else None
         left = replace(tolerances, distance=distance, held=tolerances.held - carried)
         limbs.append(_limb(creature, arm, turned, stretched, left, lying=lying))
-    if motion.mantle:
-        parts.append([replace(each, group=MANTLE_GROUP) for each in motion.mantle])
+    if own := [*motion.mantle, *motion.widths]:
+        parts.append([replace(each, group=MANTLE_GROUP) for each in own])
         tracks = _tracks(motion.mantle, _modes(creature, [each.group for each in motion.mantle]))
+        tracks += [Track(each.values, SCALE) for each in motion.widths]
         columns = range(len(tracks)) if tolerances.by_bone else None
         limbs.append(Limb(tracks, tolerances.angle, tolerances.distance, columns=columns))
     found += yield from reducing(frames, limbs, every=every, all_of_them=dense, loops=loops)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from ...keyframes import RigChannels
 from ...rotations import Floats
 from ...skeleton import Skeleton
+from ..body import BodySettings, Organs
 from ..clearance import BodyVolume
 from ..gait import Arm, GaitSettings
 from ..ground import ContactOverride, StanceSettings
@@ -29,6 +30,8 @@ class Creature:
     at_rest: Skeleton
     """As its skin is made for."""
     arms: tuple[Arm, ...]
+    bones: list[tuple[str, ...]]
+    """Of each arm, root to tip."""
     body: BodyFrame
     listed: tuple[tuple[str, ...], ...]
     """Bones of all arms, also of those that are switched off: they are no mantle either."""
@@ -40,11 +43,6 @@ class Creature:
     """Metres of the armature's unit."""
     channels: RigChannels
     """Of all bones, and of the object if that travels."""
-
-    @property
-    def bones(self) -> list[tuple[str, ...]]:
-        """Of each arm, root to tip."""
-        return [arm.bones for arm in self.arms]
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,10 +142,28 @@ class Breathing:
 
 
 @dataclass(frozen=True, eq=False)
+class BodyJob:
+    """What a body does by itself."""
+
+    settings: BodySettings = field(default_factory=BodySettings)
+    """How much of it."""
+    breathing: Breathing = field(default_factory=lambda: Breathing(0.0, 1.0))
+    organs: Organs = field(default_factory=Organs)
+    """The bones that do it."""
+    unlike: float = 0.0
+    """How much breaths differ, 1 for as much as is natural."""
+    seed: int = 0
+    look_at: Floats | None = None
+    """(frames, 3) what the eyes look at, world; none for where the body goes."""
+
+
+@dataclass(frozen=True, eq=False)
 class MotionJob:
     """All that one motion is made from, as it was read."""
 
     creature: Creature
+    in_place: bool
+    """Whether nothing travels: the motion is a loop."""
     route: Route | None
     """None for whole cycles in place."""
     cycles: int
@@ -162,7 +178,7 @@ class MotionJob:
     """Metres from the route or the ground to the body's centre; none for what the gait needs."""
     streamline: float
     """How far a mantle is stretched out along the way that its body swims: 0…1."""
-    breathing: Breathing
+    body: BodyJob
     ground: GroundJob | None
     """What walks hold on to, none where they do not."""
     volume: BodyVolume | None
@@ -181,11 +197,6 @@ class MotionJob:
     how good it is."""
     warnings: tuple[str, ...] = ()
     """What there is to say of what was read."""
-
-    @property
-    def in_place(self) -> bool:
-        """Whether nothing travels: the motion is a loop."""
-        return self.route is None
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,8 @@ import numpy as np
 
 from ...keyframes import Channel
 from ...phrases import phrase
-from ...rotations import IDENTITY, Floats, from_matrix, rotate, slerp
+from ...rotations import IDENTITY, Floats, conjugate, from_matrix, multiply, rotate, slerp
+from ..body import BodyMoments, OrganPoses, pose_organs
 from ..clearance import (
     ArmsOverGround,
     Opened,
@@ -95,6 +96,8 @@ _FLOOR_PLACES: Final = 1000
 _FLOOR_NOWHERE: Final = 1000.0
 """Arm lengths below the body: as deep as this is what has no faces."""
 
+_UNSCALED: Final = 1e-5
+"""Scales that differ from 1 by less get no keys."""
 _AROUND_CYCLES: Final = 0.15
 """Cycles to either side of a frame that a glimpse of it is worked out from, and as moments at least
 and at most. Swings are evened out and arms make way for each other within that."""
@@ -131,12 +134,13 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     posed = yield from _scaled(posing, 0.0, moving)
     arms, going, keyed, reached = posed.arms, posed.going, posed.keyed, posed.reached
     warnings = [*plan.warnings, *posed.warnings]
-    motion = _motion(plan, arms, keyed, posed.swimming)
+    organs = _organs(plan, moments, keyed, posed.swimming)
+    motion = _motion(plan, arms, keyed, organs)
     on_frames = arms.at(slice(None, None, every))
     framed = going[0][::every], going[1][::every]
     measured, overlaps = _measured(plan, on_frames, framed, keyed)
     # A key at every moment, unless fewer say the same.
-    channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.stretch]
+    channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.widths, *motion.stretch]
     if reducing:
         yield moving
         channels = yield from _scaled(_reduced(plan, motion, moments, every), moving, 1.0)
@@ -145,7 +149,7 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
             measured = measure_keyed(measured, plan.job.creature, channels, travels=travels)
     result = MotionResult(
         plan=plan,
-        channels=[*channels, *plan.breath],
+        channels=channels,
         automatic=not reducing,
         arms=arms,
         carried=reached.carried if reached is not None else (),
@@ -192,9 +196,12 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
         standing.bearings if standing is not None else None,
     )
     places = segments.places(travel)
+    offset = None if plan.surge is None else plan.surge.at(travel.distance)
+    if offset is not None:
+        places = places[0] + offset, places[1]
     # In place the ground goes by, and arms are measured as if the body went along it.
     going = object_transforms(job.creature.body, job.creature.scale, *places)
-    keyed = _stays(plan, len(times)) if job.in_place else going
+    keyed = _stays(plan, going, offset) if job.in_place else going
     frames_per_metre = every * plan.pace.mean / plan.schedule.travel.stride
     made = yield from segments.compute(travel, places, step, frames_per_metre, cyclic=cyclic)
     arms = _cleared(plan, made, going, cyclic=cyclic)
@@ -225,11 +232,12 @@ def glimpse(plan: MotionPlan, frame: float) -> list[Glimpsed]:
     first, last = max(middle - around, 0), middle + around + 1
     steps = _posed(plan, times[first:last], 2 * around + 1, cyclic=False)
     posed = _finished(steps)
-    motion = _motion(plan, posed.arms, posed.keyed, posed.swimming)
+    organs = _organs(plan, moments[first:last], posed.keyed, posed.swimming)
+    motion = _motion(plan, posed.arms, posed.keyed, organs)
     channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.stretch]
-    found = [Glimpsed(each.data_path, each.values[middle - first]) for each in channels]
-    shown = int(np.abs(plan.schedule.frames - frame).argmin())
-    return [*found, *(Glimpsed(each.data_path, each.values[shown]) for each in plan.breath)]
+    # A scale of 1 as well: what it is elsewhere in the motion is not known here.
+    channels += [plan.job.creature.channels.scale(*each) for each in organs.scales.items()]
+    return [Glimpsed(each.data_path, each.values[middle - first]) for each in channels]
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,19 +275,23 @@ def _scaled(steps: Steps[_Outcome], start: float, end: float) -> Steps[_Outcome]
         yield start + (end - start) * share
 
 
-def _stays(plan: MotionPlan, count: int) -> Travelled:
-    """Where an armature is that stays.
+def _stays(plan: MotionPlan, going: Travelled, offset: Floats | None) -> Travelled:
+    """Where an armature is that stays, but for how far (moments, 3) it is from its place.
 
     Its origin is taken to be on the ground; a root bone lifts a walking body to its height.
     """
+    count = len(going[1])
     creature = plan.job.creature
     up, world = creature.body.rotation[:, 2], creature.world
     lift = plan.height / creature.scale - float(creature.body.center @ up)
     lifted = bool(creature.root_bone) and plan.first.table.on_ground
     raised = lift * up if lifted else 0.0 * up
     location = world[:3, 3] + world[:3, :3] @ raised
-    orientation = from_matrix(world[:3, :3] / creature.scale)
-    return np.tile(location, (count, 1)), np.tile(orientation, (count, 1))
+    orientation = np.tile(from_matrix(world[:3, :3] / creature.scale), (count, 1))
+    locations = np.tile(location, (count, 1))
+    if offset is not None:
+        locations += rotate(multiply(orientation, conjugate(going[1])), offset)
+    return locations, orientation
 
 
 def _ground(plan: MotionPlan) -> Ground | None:
@@ -491,13 +503,30 @@ def _measured(
     return measured, overlaps
 
 
-def _motion(plan: MotionPlan, arms: ArmMotion, keyed: Travelled, swimming: Floats | None) -> Motion:
-    """What was computed, as channels with a key at every moment."""
-    creature, channels = plan.job.creature, plan.job.creature.channels
-    held = np.tile(plan.mantle_rotations, (len(arms.rotations), 1, 1))
+def _organs(
+    plan: MotionPlan, frames: Floats, keyed: Travelled, swimming: Floats | None
+) -> OrganPoses:
+    """What the body does by itself at frames (moments,), which need not be whole."""
+    job, creature = plan.job, plan.job.creature
+    schedule, held = plan.schedule, np.tile(plan.mantle_rotations, (len(frames), 1, 1))
     if swimming is not None:
         rest = np.broadcast_to(IDENTITY, held.shape)
         held = slerp(rest, held, np.repeat(swimming[:, None], held.shape[1], axis=1))
+    organs, look = job.body.organs, job.body.look_at
+    if look is not None:
+        columns = [np.interp(frames, schedule.frames, each) for each in look.T]
+        eyes = [creature.skeleton.index[name] for name in organs.eyes]
+        middle = creature.skeleton.heads[eyes].mean(axis=0) if eyes else creature.body.center
+        look = np.stack(columns, axis=1) - keyed[0] - rotate(keyed[1], creature.scale * middle)
+    times = np.interp(frames, schedule.frames, schedule.times) * schedule.seconds
+    moments = BodyMoments(times, keyed[1], look, held)
+    up = creature.body.rotation[:, 2]
+    return pose_organs(plan.self_motion, organs, creature.skeleton, up, moments)
+
+
+def _motion(plan: MotionPlan, arms: ArmMotion, keyed: Travelled, organs: OrganPoses) -> Motion:
+    """What was computed, as channels with a key at every moment."""
+    creature, channels = plan.job.creature, plan.job.creature.channels
     if bone := creature.root_bone:
         locations, rotations = root_bone_transforms(creature.skeleton, bone, creature.world, *keyed)
         travel = [
@@ -516,7 +545,12 @@ def _motion(plan: MotionPlan, arms: ArmMotion, keyed: Travelled, swimming: Float
     return Motion(
         travel=travel,
         arms=channels.rotations(plan.first.poser.bones, arms.rotations),
-        mantle=channels.rotations(plan.mantle, held),
+        mantle=channels.rotations(organs.bones, organs.rotations),
+        widths=[
+            channels.scale(name, each)
+            for name, each in organs.scales.items()
+            if np.abs(each - 1.0).max() > _UNSCALED
+        ],
         stretch=stretches,
         lying=arms.in_contact if plan.standing else (),
     )

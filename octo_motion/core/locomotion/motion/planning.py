@@ -13,10 +13,10 @@ import numpy as np
 
 from ...content_cache import ContentCache, content_key
 from ...errors import SettingsError
-from ...keyframes import Channel
 from ...phrases import phrase
-from ...rotations import Floats
+from ...rotations import Floats, multiply, normalized, rotate
 from ...skeleton import Skeleton
+from ..body import BodyTrack, Holds, SelfMotion, Surge, self_motion, steps_of, surge
 from ..gait import CYCLE, Arm, GaitPoser, target_places
 from ..ground import ContactOverride, GroundedWalk
 from ..path import (
@@ -28,7 +28,6 @@ from ..path import (
     TravelSettings,
     WalkedLine,
     bearings_of,
-    breathing_scales,
     check_transitions,
     duration,
     plan_travel,
@@ -43,10 +42,10 @@ from ..path import (
 from ..rig import (
     ArmFrames,
     BodyFrame,
-    find_mantle,
     frames_of_arm,
     joint_positions,
     lies_back,
+    object_transforms,
     stretch_mantle,
 )
 from .job import ChangesByHeight, GaitJob, MotionJob, ShownContact, Timing, Tolerances
@@ -177,8 +176,10 @@ class MotionPlan:
     """Bones that are stretched out, none in a walk."""
     mantle_rotations: Floats
     """(bones, 4) how, the same at every frame."""
-    breath: Sequence[Channel]
-    """Of the mantle."""
+    self_motion: SelfMotion
+    """What the body does by itself."""
+    surge: Surge | None
+    """How far the body is from its place, as its arms push it; none for nowhere."""
     warnings: tuple[str, ...]
 
     @property
@@ -245,7 +246,7 @@ def schedule(job: MotionJob) -> Schedule:
         SettingsError: the motion has no frames, or too many; a loop has no cycle.
     """
     creature, first = job.creature, job.gaits[0]
-    head = find_mantle(creature.skeleton, creature.listed or creature.bones, creature.body)
+    head = job.body.organs.mantle
     lean = job.streamline * lies_back(creature.skeleton, head, creature.body)
     travel = _travel(job, first, lean)
     route = job.route or route_in_place(travel.stride, job.cycles)
@@ -264,7 +265,6 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     """
     when = schedule(job)
     route, lean = when.route, when.lean
-    breath = _breath(job, when.head[-1] if when.head else "", when.times * when.seconds)
     plane = None
     if isinstance(job.changes, ChangesByHeight):
         plane = float(route.position(np.linspace(0.0, 1.0, _ROUTE_SAMPLES))[:, 2].min())
@@ -293,7 +293,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     swims = any(not gait.table.on_ground for gait in gaits)
     # A mantle that lies flat is swum along as it is.
     mantle = when.head if swims and job.streamline > 0.0 and not lean else ()
-    creature = job.creature
+    creature, pushed = job.creature, _surge(job, segments, route)
     yield 1.0
     return MotionPlan(
         job=job,
@@ -302,7 +302,8 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         pace=pace,
         mantle=mantle,
         mantle_rotations=stretch_mantle(creature.skeleton, mantle, creature.body, job.streamline),
-        breath=breath,
+        self_motion=_self_motion(job, when, segments, pushed),
+        surge=pushed,
         warnings=tuple(warnings),
     )
 
@@ -453,14 +454,86 @@ def _timing(job: MotionJob, route: Route, travel: TravelSettings) -> tuple[float
     return exact / rate, start + steps, np.minimum(steps / exact, 1.0)
 
 
-def _breath(job: MotionJob, mantle: str, times: Floats) -> list[Channel]:
-    """Scale of the mantle's bone, if it is to breathe, at times (frames,) in seconds."""
-    amount = job.breathing.amount
-    if not mantle or amount <= 0.0:
-        return []
-    whole = float(times[-1]) if job.in_place else None
-    scales = breathing_scales(times, amount, breath=job.breathing.seconds, whole=whole)
-    return [job.creature.channels.scale(mantle, scales)]
+def _self_motion(
+    job: MotionJob, when: Schedule, segments: Segments, pushed: Surge | None
+) -> SelfMotion:
+    """What the body does by itself, at even steps of its time."""
+    creature, first, body = job.creature, segments.gaits[0], job.body
+    times = steps_of(when.seconds)
+    bearings = first.standing.bearings if first.standing is not None else None
+    travel = plan_travel(when.route, when.travel, times / times[-1], bearings)
+    places, turns = segments.places(travel)
+    if pushed is not None:
+        places = places + pushed.at(travel.distance)
+    swims = segments.swimming(travel.distance)
+    if swims is None:
+        swims = np.full(len(times), 0.0 if first.table.on_ground else 1.0)
+    track = BodyTrack(
+        times=times,
+        locations=places / (first.poser.arm_length * creature.scale),
+        orientations=object_transforms(creature.body, creature.scale, places, turns)[1],
+        strokes=segments.strokes(travel),
+        swimming=swims,
+        cyclic=job.in_place,
+    )
+    return self_motion(
+        track,
+        body.settings,
+        breath=(body.breathing.amount, body.breathing.seconds),
+        unlike=body.unlike,
+        seed=body.seed,
+        eyes=len(body.organs.eyes),
+    )
+
+
+def _surge(job: MotionJob, segments: Segments, route: Route) -> Surge | None:
+    """How far the body is from its place, as the arms push it that hold on to the ground."""
+    # What has nothing to travel on stays where it is.
+    if job.in_place and not job.creature.root_bone:
+        return None
+    reach = segments.gaits[0].poser.arm_length * job.creature.scale
+    changes = [(-np.inf, 0.0), *((each.start, each.end) for each in segments.changes)]
+    ends = [*(each.start for each in segments.changes), np.inf]
+    found: list[Floats] = []
+    calm = changes[1:]
+    line: Line | Course | None = None
+    for segment, ((_, first), last) in enumerate(zip(changes, ends, strict=True)):
+        number = segments.gait_of(segment)
+        walk, gait = segments.walks[number], segments.gaits[number]
+        if walk is None or gait.standing is None:
+            calm.append((first, min(last, route.length)))
+            continue
+        line = segments.transitions.course if segments.transitions else gait.standing.line
+        unit = gait.travel.stride / CYCLE
+        holds = np.array(
+            [(unit * each.touch_down, unit * each.lift_off, each.arm) for each in walk.footholds()]
+        ).reshape(-1, 3)
+        middles = 0.5 * (holds[:, 0] + holds[:, 1])
+        found.append(holds if job.in_place else holds[(middles > first) & (middles < last)])
+    if line is None or not (holds := np.concatenate(found)).size:
+        return None
+    return surge(
+        _holds_behind(holds, line, segments.gaits[0].poser),
+        lambda distance: line.at(distance)[0],
+        route.length,
+        stride=segments.gaits[0].travel.stride,
+        reach=reach,
+        amount=job.body.settings.surge,
+        calm=np.array(calm).reshape(-1, 2),
+        cyclic=job.in_place,
+    )
+
+
+def _holds_behind(holds: Floats, line: Line | Course, poser: GaitPoser) -> Holds:
+    """Holds (n, 3) from a distance to a distance, of arms by their numbers, and how far these stand
+    behind the body half way, by where they lead out of it.
+    """
+    start, end, arms = holds.T
+    middle, step = 0.5 * (start + end), 0.25 * np.maximum(end - start, 1e-9)
+    (before, _), (after, _) = line.at(middle - step), line.at(middle + step)
+    outward = poser.outward[arms.astype(int)]
+    points = rotate(multiply(line.at(middle)[1], outward), np.array([1.0, 0.0, 0.0]))
+    return Holds(start, end, -np.sum(points * normalized(after - before), axis=1))
 
 
 # --- Where the gait changes ----------------------------------------------------------------------

@@ -421,6 +421,15 @@ class Segments:
         weights = way_weights(self.changes, len(self.gaits), distance)
         return weights[:, [not gait.table.on_ground for gait in self.gaits]].sum(axis=1)
 
+    def strokes(self, travel: Travel) -> Floats:
+        """Strokes (moments,) of the swim since the middle of one; of no use where nothing swims."""
+        if self.transitions is None:
+            return (travel.phase - self.gaits[0].travel.stroke_phase) / CYCLE
+        lines = [each for each in self.transitions.course.lines if isinstance(each, SwumLine)]
+        if not lines:
+            return np.zeros(len(travel.distance))
+        return (lines[0].phase(travel.distance) - lines[0].settings.stroke_phase) / CYCLE
+
     def afloat(self, distance: Floats) -> Floats | None:
         """How far arms (moments, arms) are to be kept off a ground that their gait knows not."""
         if self.transitions is None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -162,17 +162,11 @@ class CourseLine:
         return self.course.at(distance)
 
 
-# --- Motion in place that repeats: whole cycles of a gait, and a breath ---------------------------
+# --- Motion in place that repeats: whole cycles of a gait -----------------------------------------
 #
 # The arms' phases are whole turns apart at the two ends, whatever offsets they have and whatever
 # the gait; so the last frame is the first one in position, and what comes after the first frame
 # is what would come after the last: the seam is a moment like any other.
-
-
-_BULGE: Final = 0.35
-"""How much shorter a mantle gets, as a share of how much wider it gets."""
-_INHALE: Final = 0.42
-"""Share of a breath spent breathing in, which is quicker than breathing out."""
 
 
 def route_in_place(stride: float, cycles: int) -> Route:
@@ -196,28 +190,3 @@ def travel_in_place(travel: TravelSettings) -> TravelSettings:
 def whole_frames(frames: float) -> float:
     """As many frames as a loop of about that length has."""
     return float(max(round(frames), 2))
-
-
-def breathing_scales(times: Floats, amount: float, *, breath: float, whole: float | None) -> Floats:
-    """Scales (frames, 3) of a mantle that breathes at times (frames,), s: across, along the bone,
-    across.
-
-    It fills rather quickly and empties slowly, without a corner between the two. A breath takes so
-    many seconds, and widens it by an amount, as a share; a loop takes a whole number of breaths, at
-    least one.
-
-    Raises:
-        SettingsError: a breath takes no time.
-    """
-    if not breath > 0.0:
-        raise SettingsError(
-            phrase("A breath takes {breath:g} seconds.", breath=breath), "Give more than 0."
-        )
-    if whole is not None:
-        breath = whole / max(round(whole / breath), 1)
-    share = np.mod(times / breath, 1.0)
-    # Half a turn for breathing in and half a turn for breathing out.
-    turn = np.interp(share, [0.0, _INHALE, 1.0], [0.0, 0.5, 1.0])
-    filled = amount * 0.5 * (1.0 - np.cos(2.0 * np.pi * turn))
-    across, along = 1.0 + filled, 1.0 - _BULGE * filled
-    return np.stack([across, along, across], axis=-1)

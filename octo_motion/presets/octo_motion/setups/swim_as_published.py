@@ -19,3 +19,6 @@ settings.ease_in = 0.0
 settings.ease_out = 0.0
 settings.burst = 0.0
 settings.contraction = 0.0
+for name in ("surge", "mantle", "siphon", "eyes", "head"):
+    setattr(settings.body, name, 0.0)
+settings.breathing = 0.0

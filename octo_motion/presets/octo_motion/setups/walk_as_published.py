@@ -17,3 +17,6 @@ settings.sway = 0.0
 settings.speed_mode = "NATURAL"
 settings.ease_in = 0.0
 settings.ease_out = 0.0
+for name in ("surge", "mantle", "siphon", "eyes", "head"):
+    setattr(settings.body, name, 0.0)
+settings.breathing = 0.0

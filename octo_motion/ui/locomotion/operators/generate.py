@@ -401,7 +401,7 @@ def _sources(armature: bpy.types.Object) -> set[bpy.types.ID]:
     """Data-blocks that a motion is made from, but for its armature object."""
     settings = locomotion_settings(armature)
     roots: list[bpy.types.Object | None] = [
-        *(settings.route, settings.ground.object, armature.parent),
+        *(settings.route, settings.ground.object, armature.parent, settings.body.look_at),
         # What is carried gets keys from us.
         *(each.target for each in settings.reaches if not each.carry),
     ]

@@ -2,10 +2,12 @@
 """From settings and scene to what core works on."""
 
 from .motion import (
+    read_body,
     read_changes,
     read_floor,
     read_gaits,
     read_ground,
+    read_look,
     read_reaches,
     read_timing,
     resting,
@@ -32,11 +34,13 @@ __all__ = [
     "placed_arms",
     "playing_action",
     "previous_action",
+    "read_body",
     "read_changes",
     "read_creature",
     "read_floor",
     "read_gaits",
     "read_ground",
+    "read_look",
     "read_reaches",
     "read_timing",
     "read_volume",

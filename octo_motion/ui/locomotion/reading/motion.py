@@ -24,9 +24,12 @@ from ....blender.scene import (
 )
 from ....core.errors import GroundError, SettingsError
 from ....core.keyframes import check_bounds
+from ....core.locomotion.body import BodySettings, find_organs
 from ....core.locomotion.gait import GaitSettings, GaitTable
 from ....core.locomotion.ground import StanceSettings
 from ....core.locomotion.motion import (
+    BodyJob,
+    Breathing,
     ChangeAt,
     ChangesByHeight,
     Creature,
@@ -131,6 +134,53 @@ def read_timing(settings: OCTO_MOTION_PG_locomotion, render: bpy.types.RenderSet
         rate=render.fps / render.fps_base,
         duty=settings.ground.duty,
     )
+
+
+def read_body(settings: OCTO_MOTION_PG_locomotion, creature: Creature) -> BodyJob:
+    """What the body does by itself, but for what it looks at.
+
+    Raises:
+        RigError: a bone that was given by hand is not there, or cannot move by itself.
+    """
+    body = settings.body
+    organs = find_organs(
+        creature.skeleton,
+        creature.listed or creature.bones,
+        creature.body,
+        mantle=body.mantle_bone,
+        siphon=body.siphon_bone,
+        eyes=(body.eye_left, body.eye_right),
+    )
+    return BodyJob(
+        settings=read_settings(BodySettings, body),
+        breathing=Breathing(settings.breathing, settings.breath_time),
+        organs=organs,
+        unlike=1.0,
+        seed=settings.seed,
+    )
+
+
+def read_look(
+    settings: OCTO_MOTION_PG_locomotion, armature: bpy.types.Object, frames: Floats
+) -> Floats | None:
+    """Where what the eyes look at is at frames (frames,), world; none for nothing.
+
+    Raises:
+        SettingsError: it moves with the armature.
+    """
+    target = settings.body.look_at
+    if target is None or settings.body.eyes <= 0.0:
+        return None
+    if hangs_on(target, armature):
+        raise SettingsError(
+            phrase(
+                "'{target}' hangs on '{armature}', whose eyes look at it.",
+                target=target.name,
+                armature=armature.name,
+            ),
+            "Clear its parent and its constraints to the armature, or look at something else.",
+        )
+    return read_places(target, frames)[0]
 
 
 # --- Where the gait changes, as the settings say --------------------------------------------------

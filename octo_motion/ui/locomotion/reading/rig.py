@@ -203,6 +203,7 @@ def read_creature(
             skeleton=skeleton,
             at_rest=at_rest,
             arms=arms,
+            bones=[arm.bones for arm in arms],
             body=body,
             listed=tuple(bones_of(item) for item in settings.arms if item.bones),
             root_bone=root_bone,

@@ -2,7 +2,8 @@
 """What an artist sets, kept with the armature object."""
 
 from ...steps import own_classes
-from . import gait, lists, properties
+from . import body, gait, lists, properties
+from .body import keep_look, stamp
 from .gait import (
     DEFAULT_GAIT,
     SIDES,
@@ -44,7 +45,7 @@ from .properties import (
     write_figures,
 )
 
-CLASSES = own_classes(gait, lists, properties)
+CLASSES = own_classes(body, gait, lists, properties)
 
 __all__ = [
     "AXES",
@@ -70,6 +71,7 @@ __all__ = [
     "fill_gait_table",
     "fill_offsets",
     "fill_table",
+    "keep_look",
     "known_figures",
     "locomotion_settings",
     "matched",
@@ -79,6 +81,7 @@ __all__ = [
     "read_gait",
     "read_overrides",
     "set_gait",
+    "stamp",
     "store",
     "used",
     "write_figures",

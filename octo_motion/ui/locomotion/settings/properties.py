@@ -23,6 +23,7 @@ from ....core.locomotion.path import TravelSettings
 from ....core.phrases import phrase
 from ... import declared_settings as props
 from ...declared_settings import declared, emptied, make_overridable
+from .body import OCTO_MOTION_PG_body
 from .gait import (
     DEFAULT_GAIT,
     GaitName,
@@ -349,13 +350,15 @@ class Timing:
     )
     breathing: props.FactorProperty(
         name="Breathing",
-        description="How much wider the mantle gets with each breath; 0 gives it no keys",
+        description="How much wider the mantle gets with each breath; 0 for none",
+        default=0.05,
         soft_max=0.3,
         step=1,
     )
     breath_time: _Seconds(
         name="Breath",
-        description="Time that one breath takes. A loop takes a whole number of breaths",
+        description="Time that one breath takes at rest; a body that goes fast breathes faster. A "
+        "loop takes a whole number of breaths",
         default=3.0,
         min=0.05,
     )
@@ -484,6 +487,11 @@ class OCTO_MOTION_PG_locomotion(
         name="Ground",
         description="What a walking creature stands on, and how",
         type=OCTO_MOTION_PG_ground,
+    )
+    body: props.PointerProperty(
+        name="Body",
+        description="What the body does by itself while its arms carry it",
+        type=OCTO_MOTION_PG_body,
     )
     change: props.PointerProperty(
         name="Change of Gait",

@@ -29,7 +29,6 @@ from ....core.errors import RouteError, WriteError
 from ....core.keyframes import Channel
 from ....core.locomotion.metrics import Figure, Played, figures, played_arm, warnings_for_figures
 from ....core.locomotion.motion import (
-    Breathing,
     MotionJob,
     MotionPlan,
     MotionResult,
@@ -47,11 +46,13 @@ from ..reading import (
     bones_of,
     playing_action,
     previous_action,
+    read_body,
     read_changes,
     read_creature,
     read_floor,
     read_gaits,
     read_ground,
+    read_look,
     read_reaches,
     read_timing,
     read_volume,
@@ -417,7 +418,7 @@ def show_contacts(
 RESULTS: Final = frozenset(
     {
         *("result", "shown", "figures", "live", "live_error", "show_targets"),
-        *("extended_from", "extended_to"),
+        *("extended_from", "extended_to", "file_knows"),
     }
 )
 """What is no setting, though it is kept with them."""
@@ -478,6 +479,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     walks = any(each.settings.gait.on_ground for each in gaits)
     job = MotionJob(
         creature=creature,
+        in_place=in_place,
         route=None if in_place else read_route(settings.route, depsgraph, settings.spline),
         cycles=settings.cycles,
         repeats=in_place and settings.repeat,
@@ -486,7 +488,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         timing=read_timing(settings, scene.render),
         height=settings.height if settings.height_mode == "MANUAL" else None,
         streamline=settings.streamline,
-        breathing=Breathing(settings.breathing, settings.breath_time),
+        body=read_body(settings, creature),
         ground=read_ground(settings, armature, depsgraph, creature, edits, walks=walks),
         floor=None if live else read_floor(settings, armature, depsgraph, creature, walks=walks),
         volume=read_volume(settings, armature, creature, live=live),
@@ -497,9 +499,11 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         live=live,
         warnings=(*found.warnings, *warnings_for_display(armature, scene.render), *found.poses),
     )
-    if any(not item.mute for item in settings.reaches):
+    if settings.body.look_at is not None or any(not item.mute for item in settings.reaches):
         frames = schedule(job).frames
-        job = replace(job, reaching=read_reaches(armature, settings, found, frames))
+        look = replace(job.body, look_at=read_look(settings, armature, frames))
+        reaching = read_reaches(armature, settings, found, frames)
+        job = replace(job, reaching=reaching, body=look)
     return Shot(
         armature=armature.name,
         scene=scene.name,

@@ -10,7 +10,6 @@ from octo_motion.core.errors import SettingsError
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.core.locomotion.gait.gait_poser import Arm, GaitPoser, GaitSettings
 from octo_motion.core.locomotion.path.course import (
-    breathing_scales,
     route_in_place,
     travel_in_place,
     whole_frames,
@@ -102,25 +101,6 @@ def test_a_loop_lasts_whole_frames() -> None:
     assert whole_frames(0.2) == 2.0
 
 
-def test_a_breath_closes_with_the_loop_and_has_no_corner() -> None:
-    times = np.linspace(0.0, 10.0, 4001)
-    scales = breathing_scales(times, 0.2, breath=2.9, whole=10.0)
-    np.testing.assert_allclose(scales[0], scales[-1], atol=1e-12)
-    assert scales[:, 0].max() == pytest.approx(1.2, abs=1e-4)
-    assert scales[:, 0].min() == pytest.approx(1.0, abs=1e-12)
-    # Three breaths; it fills faster than it empties.
-    peaks = np.flatnonzero((scales[1:-1, 0] > scales[:-2, 0]) & (scales[1:-1, 0] >= scales[2:, 0]))
-    assert len(peaks) == 3
-    slope = np.diff(scales[:, 0])
-    assert slope.max() > -slope.min()
-    assert np.abs(np.diff(slope)).max() < 0.01 * slope.max()
-    # Long as it gets short: more or less the same volume.
-    volume = scales.prod(axis=1)
-    assert volume.max() < 1.35
-
-
 def test_what_makes_no_loop_is_told() -> None:
     with pytest.raises(SettingsError, match="0 cycles"):
         route_in_place(1.0, 0)
-    with pytest.raises(SettingsError, match="breath takes"):
-        breathing_scales(np.zeros(2), 0.1, breath=0.0, whole=None)

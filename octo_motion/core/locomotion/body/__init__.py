@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a body does by itself while its arms carry it: it surges, breathes, trails, and looks."""
+
+from .by_itself import (
+    BodyMoments,
+    BodySettings,
+    BodyTrack,
+    Holds,
+    OrganPoses,
+    Organs,
+    SelfMotion,
+    Surge,
+    find_organs,
+    pose_organs,
+    self_motion,
+    steps_of,
+    surge,
+)
+
+__all__ = [
+    "BodyMoments",
+    "BodySettings",
+    "BodyTrack",
+    "Holds",
+    "OrganPoses",
+    "Organs",
+    "SelfMotion",
+    "Surge",
+    "find_organs",
+    "pose_organs",
+    "self_motion",
+    "steps_of",
+    "surge",
+]
