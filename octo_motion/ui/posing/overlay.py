@@ -9,12 +9,14 @@ from typing import Any, Final
 import bpy
 import numpy as np
 
+from ...core.posing.puppet import capsules_in_world
 from ...core.posing.wireframe import arrow_lines, capsule_lines, load_colours, pin_lines
 from ...core.rotations import Floats
 from ..overlay_lines import Lines, draw_lines
 from .controls import PoseControls
 from .device_hands import DeviceHands, NdofHands
 from .properties import posing_settings
+from .puppet_session import PuppetSession
 
 _HOVERED: Final = (1.0, 1.0, 1.0, 0.9)
 _HELD: Final = (1.0, 0.6, 0.1, 1.0)
@@ -24,6 +26,10 @@ _ALPHA: Final = 0.55
 _FREE: Final = (0.6, 0.9, 1.0, 1.0)
 _HOLDING: Final = (1.0, 0.6, 0.1, 1.0)
 _STRONG: Final = (1.0, 0.1, 0.1, 1.0)
+_EARLIER: Final = (0.25, 0.45, 0.95, 0.35)
+_LATER: Final = (0.25, 0.85, 0.35, 0.35)
+_STANDS: Final = (0.3, 0.95, 0.35, 1.0)
+_FALLS: Final = (1.0, 0.25, 0.15, 1.0)
 _POINTER: Final = 0.03
 """Of the figure."""
 
@@ -58,6 +64,34 @@ def overlay_lines(
         size = 0.012 * session.size
         joints = session.core.pose.positions[pins] / session.unit
         found.append(_one_colour(pin_lines(joints, size), _PIN, 2.0))
+    return found + _aid_lines(session)
+
+
+def _aid_lines(session: PuppetSession) -> Lines:
+    """Onion skins, arcs and balance, as far as they are wanted."""
+    found: Lines = []
+    wanted, unit, own = session.settings, session.unit, session.puppet.own
+    frame = session.scene().frame_current_final
+    for later, pose in session.traces.ghosts(frame, wanted.onion, wanted.onion_step):
+        ends = capsules_in_world(session.figure, pose)[own.start : own.stop] / unit
+        radii = session.figure.radii[own.start : own.stop] / unit
+        found.append(_one_colour(capsule_lines(ends, radii), _LATER if later else _EARLIER, 1.0))
+    if wanted.trails:
+        for way, colour in ((session.traces.hand, _ARROW), (session.traces.tip, _HOVERED)):
+            if len(way) > 1:
+                found.append(_one_colour(np.stack([way[:-1], way[1:]], axis=1), colour, 2.0))
+    if wanted.balance != "OFF":
+        balance = session.balancing.now()
+        centre, outline = balance.centre / unit, balance.outline / unit
+        colour = _STANDS if balance.room > 0.0 else _FALLS
+        size = 0.02 * session.size
+        cross = np.stack([centre - size * np.eye(3), centre + size * np.eye(3)], axis=1)
+        found.append(_one_colour(cross, colour, 3.0))
+        if len(outline):
+            around = np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
+            foot = np.array([*centre[:2], outline[0, 2]])
+            found.append(_one_colour(around, colour, 2.0))
+            found.append(_one_colour(np.stack([centre, foot])[None], colour, 1.0))
     return found
 
 

@@ -102,6 +102,22 @@ class OCTO_MOTION_PT_posing_world(PosePanel, bpy.types.Panel):
         layout.operator_menu_enum(OCTO_MOTION_OT_pose_loose.bl_idname, "moves", text="Selected")
 
 
+class OCTO_MOTION_PT_posing_aids(PosePanel, bpy.types.Panel):
+    bl_label = "Aids"
+    bl_parent_id = "OCTO_MOTION_PT_posing"
+
+    def show(self, layout: Any, settings: Any) -> None:
+        layout.prop(settings, "mirror")
+        layout.prop(settings, "balance")
+        if settings.balance == "KEPT" and settings.root != "FREE":
+            layout.label(text="Root is not Free", icon="INFO")
+        layout.prop(settings, "trails")
+        layout.prop(settings, "onion")
+        step = layout.row()
+        step.active = settings.onion > 0
+        step.prop(settings, "onion_step")
+
+
 class OCTO_MOTION_PT_posing_bones(PosePanel, bpy.types.Panel):
     bl_label = "Limbs"
     bl_parent_id = "OCTO_MOTION_PT_posing"
@@ -272,6 +288,7 @@ def draw_calibration(layout: Any, hands: DeviceHands, number: int, device: Devic
 CLASSES: Final[tuple[type, ...]] = (
     OCTO_MOTION_PT_posing,
     OCTO_MOTION_PT_posing_world,
+    OCTO_MOTION_PT_posing_aids,
     OCTO_MOTION_PT_posing_bones,
     OCTO_MOTION_PT_posing_keys,
     OCTO_MOTION_PT_posing_device,

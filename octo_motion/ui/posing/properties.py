@@ -39,6 +39,22 @@ MOVES: Final = (
     ("FLOATS", "Floats", "As Can Be Pushed, and without weight where the puppet has none", 2),
 )
 
+BALANCE: Final = (
+    ("OFF", "Off", "Nothing is looked at", 0),
+    (
+        "SHOWN",
+        "Shown",
+        "Draw the centre of mass over what the figure stands on: limbs pinned or touching a floor",
+        1,
+    ),
+    (
+        "KEPT",
+        "Kept",
+        "Lead the root so that the centre of mass stays over the pinned feet; Root has to be Free",
+        2,
+    ),
+)
+
 TARGETS: Final = (
     (
         "CURRENT",
@@ -205,6 +221,38 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
         max=float(np.radians(45.0)),
         step=50,
         precision=2,
+    )
+
+    # --- What helps ------------------------------------------------------------------------------
+
+    mirror: props.BoolProperty(
+        name="Mirror",
+        description="What is pulled on one side happens on the other too; sides are told by the "
+        "bones' names, as Blender's X mirror does",
+    )
+    balance: props.EnumProperty(
+        name="Balance",
+        description="Whether the figure would stand",
+        items=BALANCE,
+    )
+    trails: props.BoolProperty(
+        name="Arcs",
+        description="Draw the ways of the hand and of what it holds during a drag",
+    )
+    onion: props.IntProperty(
+        name="Onion Skins",
+        description="How many poses before and after are drawn, of frames that were shown or keyed "
+        "in this session",
+        default=0,
+        min=0,
+        soft_max=8,
+    )
+    onion_step: props.IntProperty(
+        name="Every",
+        description="Frames from one onion skin to the next",
+        default=4,
+        min=1,
+        soft_max=48,
     )
 
     # --- What is shown ------------------------------------------------------------------------

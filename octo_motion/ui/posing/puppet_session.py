@@ -41,6 +41,7 @@ from ...core.posing.puppet import (
 from ...core.posing.session import HandSample, Session, TickReport, hand_for
 from ...core.posing.solver import HandSpring, OneThread, WorldSettings
 from ...core.rotations import IDENTITY, Floats, rotate
+from .aids import Balancing, OtherSide, Traces
 from .companions import Companions, company_of, elements_beside, hold_partners
 from .measuring_hand import MeasuringHand, coefficients, measured_joint
 from .properties import posing_settings
@@ -81,6 +82,9 @@ class PosedPuppet:
         self._weights = joint_loads(figure)
         self.settings.hold_root(self.puppet.main, self.core)
         hold_partners(self.puppet, self.core)
+        self.other_side = OtherSide(self.puppet.main, self.core)
+        self.traces = Traces()
+        self.balancing = Balancing(self.core, self.puppet.own)
 
     # --- What is there --------------------------------------------------------------------------
 
@@ -173,6 +177,9 @@ class PosedPuppet:
         """Nail a body to its place or take the nail out; what was done, in words."""
         state = body not in self.core.pins
         self.core.pin(body, state=state)
+        other = self.other_side.opposite.get(body)
+        if self.settings.mirror and other is not None:
+            self.core.pin(other, state=state)
         return phrase("{bone} pinned" if state else "{bone} free again", bone=self.bone(body))
 
     def pick(self, origin: Floats, direction: Floats, *, margin: float = 0.0) -> Hit | None:
@@ -182,7 +189,7 @@ class PosedPuppet:
     def grab(self, body: int, point: Floats) -> None:
         """Take hold of a body at a point (3,) in the puppet's metres; what was held is let go."""
         self.core.release()
-        self.core.grab(body, point)
+        self._take(body, point)
 
     def grab_bone(self, bone: str, share: float) -> Floats:
         """Take hold of a bone by name, at a share of its length; the point (3,) in the world.
@@ -203,7 +210,15 @@ class PosedPuppet:
         # From the joint to the limb's end, in the middle of which its mass is: of a ball too.
         way = 2.0 * share * self.figure.centres[body]
         point = pose.positions[body] + rotate(pose.orientations[body], way)
-        return self.core.grab(body, point), point / self.unit
+        return self._take(body, point), point / self.unit
+
+    def _take(self, body: int, point: Floats) -> HandSpring:
+        """Take hold with one more hand, and with one on the other side where that is wanted."""
+        spring = self.core.grab(body, point)
+        self.traces.begin()
+        if posing_settings(self.puppet.armature()).mirror:
+            self.other_side.take(spring)
+        return spring
 
     def is_edited(self) -> bool:
         """Whether the armature is in edit mode, where nothing is posed.
@@ -367,6 +382,7 @@ class KeyedPuppet(PosedPuppet):
         keyed = [Keyed(*each) for each in self.puppet.main.keyed(own, all_bones=all_bones)]
         frame, armature = self.scene().frame_current_final, self.puppet.armature()
         done: list[str] = []
+        self.traces.stood(frame, self.core.pose)
         if keyed:
             with pose_kept(armature):
                 done = self.keys.insert(armature, keyed, frame, auto=auto)
@@ -472,6 +488,7 @@ class PuppetSession(RecordedPuppet):
         super().__init__(armature, scene, clock, partners)
         self._values = pose_values(armature)
         self._frame = self._started = scene.frame_current_final
+        self.traces.stood(self._frame, self.core.pose)
         self.ended = False
         """Whether it is over."""
         self.report: TickReport | None = None
@@ -543,7 +560,11 @@ class PuppetSession(RecordedPuppet):
         if self.held is not None and position is not None:
             turned = IDENTITY if turn is None else turn
             held[self.held] = HandSample(position * self.unit, turned)
-        self.report = self.core.tick(seconds, held)
+        self.balancing.keep(kept=self.settings.balance == "KEPT")
+        self.report = self.core.tick(seconds, self.other_side.samples(held))
+        point = self.held_point()
+        if self.settings.trails and point is not None and held:
+            self.traces.add(next(iter(held.values())).position / self.unit, point)
         if not self.report.resting:
             self.puppet.write(self.core.pose)
         return self.report
@@ -675,6 +696,7 @@ class PuppetSession(RecordedPuppet):
             self.puppet.forget()
             if self._recording is None:
                 self.core.adopt(self.puppet.read())
+                self.traces.stood(self._frame, self.core.pose)
             else:
                 self._record_frame(self._recording, self._frame)
         except OctoMotionError as error:

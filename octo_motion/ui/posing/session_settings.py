@@ -40,6 +40,7 @@ _FOLLOWED: Final = (
     *CUSTOM_NAMES,
     *("strength", "root", "gravity", "floor", "floor_height", "use_obstacles"),
     *("self_collision", "friction"),
+    *("mirror", "balance", "trails", "onion", "onion_step"),
 )
 
 
