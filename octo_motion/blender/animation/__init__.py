@@ -18,6 +18,7 @@ from .actions import (
     writable_object,
     write_action,
 )
+from .artist_layer import CYCLES, edit_layer, follow, is_layer, lay_edits, quarters
 from .clip_sources import actions_for, still_clip
 from .clips import (
     closes,
@@ -54,6 +55,7 @@ from .scene_playback import play_bones, time_kept
 from .spliced_action import STEP, SplicedMotion, write_layer, write_spliced
 
 __all__ = [
+    "CYCLES",
     "SCALE",
     "STEP",
     "Channel",
@@ -69,13 +71,17 @@ __all__ = [
     "closes",
     "curves_of",
     "displaced_bones",
+    "edit_layer",
+    "follow",
     "further_channels",
     "is_edited",
     "is_generated",
+    "is_layer",
     "is_recorded",
     "key_counts",
     "key_points",
     "lasting",
+    "lay_edits",
     "mark_file_changed",
     "may_replace",
     "note_of",
@@ -83,6 +89,7 @@ __all__ = [
     "pose_kept",
     "pose_values",
     "posed_channels",
+    "quarters",
     "read_channels",
     "read_clip",
     "read_object_channels",

@@ -150,6 +150,7 @@ def write_action(
     repeats: bool = False,
     replaceable: bool = False,
     automatic: bool = False,
+    beneath: bool = False,
 ) -> bpy.types.Action:
     """Give an object an action with these channels: their own keys, or one key per frame.
 
@@ -168,6 +169,7 @@ def write_action(
         repeats: whether curves go on before their first key and after their last, over and over.
         replaceable: whether :func:`may_replace` has just said yes of ``previous``.
         automatic: whether keys on every frame have automatic handles, and lead straight on if not.
+        beneath: whether the object goes on with the action that it has, which lies over this one.
 
     Returns:
         The action, assigned to the object together with its slot.
@@ -185,9 +187,13 @@ def write_action(
     action.use_cyclic = repeats
     action.use_frame_range = True
     action.frame_start, action.frame_end = float(times[0]), float(times[-1])
-    _assign(obj, action)
+    if not beneath:
+        _assign(obj, action)
+    tracks = _tracks_of(action)
     _mark(action, obj, settings_note, digests, handles)
     action[MARK]["frames"] = len(times)
+    for key, track in tracks.items():
+        action[MARK][key] = track
     return action
 
 
@@ -212,7 +218,7 @@ def generated_action(
     writable_object(obj)
     if previous is not None and (replaceable or may_replace(previous, obj)):
         return previous
-    return _new_action(obj, name)
+    return new_action(obj, name)
 
 
 def assign_generated(obj: bpy.types.Object, action: bpy.types.Action, settings_note: str) -> None:
@@ -225,7 +231,7 @@ def assign_generated(obj: bpy.types.Object, action: bpy.types.Action, settings_n
 
 def mark_generated(obj: bpy.types.Object, action: bpy.types.Action, settings_note: str) -> None:
     """Mark an action as it is now; of one that is a layer of the NLA, its tracks are remembered."""
-    tracks = {key: action[MARK][key] for key in ("track", "beneath") if key in action.get(MARK, {})}
+    tracks = _tracks_of(action)
     handles = {
         (path, index): _handles(curve)
         for path, index, _, curve in _listed(action)
@@ -234,6 +240,11 @@ def mark_generated(obj: bpy.types.Object, action: bpy.types.Action, settings_not
     _mark(action, obj, settings_note, None, handles)
     for key, name in tracks.items():
         action[MARK][key] = name
+
+
+def _tracks_of(action: bpy.types.Action) -> dict[str, str]:
+    mark = action.get(MARK, {})
+    return {key: mark[key] for key in ("track", "beneath") if key in mark}
 
 
 def _assign(obj: bpy.types.Object, action: bpy.types.Action) -> None:
@@ -383,7 +394,8 @@ def _constraint_actions(obj: bpy.types.Object) -> list[bpy.types.Action | None]:
     ]
 
 
-def _new_action(obj: bpy.types.Object, name: str) -> bpy.types.Action:
+def new_action(obj: bpy.types.Object, name: str) -> bpy.types.Action:
+    """An empty action of one slot for an object."""
     action = bpy.data.actions.new(name)
     action.slots.new("OBJECT", obj.name)
     action.layers.new("Layer").strips.new(type="KEYFRAME")

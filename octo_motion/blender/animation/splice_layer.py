@@ -56,7 +56,7 @@ def lay_over(
         track = data.nla_tracks.new()
         track.name = f"{base.name} Base"
         mark[_BENEATH] = track.name
-        _strip(track, base, slot)
+        make_strip(track, base, slot)
     if data.action is not None and any(
         not is_setting(curve.data_path) for curve in curves_of(data.action)
     ):
@@ -69,10 +69,10 @@ def lay_over(
         track = data.nla_tracks.new()
         track.name = action.name
         mark[_TRACK] = track.name
-        found = _strip(track, action, action.slots[0])
+        found = make_strip(track, action, action.slots[0])
         found.blend_type, found.extrapolation = "REPLACE", "NOTHING"
     else:
-        _fit(found, action)
+        fit_strip(found, action)
 
 
 def take_off(armature: bpy.types.Object, action: bpy.types.Action | None) -> None:
@@ -102,16 +102,17 @@ def _layer(data: bpy.types.AnimData, action: bpy.types.Action) -> bpy.types.NlaS
     return next((strip for strip in strips if strip.action == action), None)
 
 
-def _strip(
+def make_strip(
     track: bpy.types.NlaTrack, action: bpy.types.Action, slot: bpy.types.ActionSlot
 ) -> bpy.types.NlaStrip:
+    """A strip of an action that plays all of it."""
     strip = track.strips.new(action.name, round(action.frame_range[0]), action)
     strip.action_slot = slot
-    _fit(strip, action)
+    fit_strip(strip, action)
     return strip
 
 
-def _fit(strip: bpy.types.NlaStrip, action: bpy.types.Action) -> None:
+def fit_strip(strip: bpy.types.NlaStrip, action: bpy.types.Action) -> None:
     """Let a strip play all of an action at its own frames; strips are made on whole ones."""
     first, last = action.frame_range
     strip.action_frame_start, strip.action_frame_end = first, last

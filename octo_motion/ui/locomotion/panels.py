@@ -25,6 +25,7 @@ from .operators import (
     OCTO_MOTION_PT_reaches,
     OCTO_MOTION_PT_setups,
     OCTO_MOTION_PT_table,
+    draw_edits,
     draw_rest,
     draw_setups,
     shown_name,
@@ -240,6 +241,7 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
             draw_sentence(row, bpy.context, settings.live_error, "ERROR")
         if settings.result is not None:
             _draw_result(layout, settings.result)
+            draw_edits(layout, cast("bpy.types.Object", settings.id_data), settings.result)
 
 
 class OCTO_MOTION_PT_frames(_Panel, bpy.types.Panel):

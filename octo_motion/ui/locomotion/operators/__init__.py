@@ -2,7 +2,7 @@
 """The buttons, and what of the panel belongs to each."""
 
 from ...steps import Step, own_classes
-from . import adding, arms, contacts, gait_table, generate, quality, reaches, setups
+from . import adding, arms, contacts, edits, gait_table, generate, quality, reaches, setups
 from .adding import (
     OCTO_MOTION_OT_add_octopus,
     OCTO_MOTION_OT_add_route,
@@ -11,6 +11,7 @@ from .adding import (
 )
 from .arms import OCTO_MOTION_PT_arms
 from .contacts import OCTO_MOTION_PT_contact, OCTO_MOTION_PT_ground, draw_rest
+from .edits import draw_edits
 from .gait_table import OCTO_MOTION_MT_gait, OCTO_MOTION_MT_gaits, OCTO_MOTION_PT_table
 from .generate import OCTO_MOTION_OT_generate_locomotion
 from .quality import OCTO_MOTION_PT_quality
@@ -18,7 +19,7 @@ from .reaches import OCTO_MOTION_PT_change, OCTO_MOTION_PT_reaches
 from .setups import OCTO_MOTION_PT_setups, draw_setups, shown_name
 
 CLASSES = (
-    *own_classes(arms, adding, gait_table, generate, contacts, setups, quality, reaches),
+    *own_classes(arms, adding, gait_table, generate, edits, contacts, setups, quality, reaches),
     OCTO_MOTION_PT_contact,
     OCTO_MOTION_PT_setups,
 )
@@ -47,6 +48,7 @@ __all__ = [
     "OCTO_MOTION_PT_reaches",
     "OCTO_MOTION_PT_setups",
     "OCTO_MOTION_PT_table",
+    "draw_edits",
     "draw_rest",
     "draw_setups",
     "shown_name",

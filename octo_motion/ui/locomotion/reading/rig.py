@@ -17,6 +17,7 @@ from ....blender.animation import (
     as_posed,
     displaced_bones,
     is_generated,
+    is_layer,
     read_channels,
 )
 from ....blender.rig import (
@@ -394,6 +395,9 @@ def warnings_for_layers(armature: bpy.types.Object) -> list[str]:
     if data is None or not any(len(track.strips) for track in tracks if not track.mute):
         return []
     name = f"'{armature.name}'"
+    if is_layer(data.action):
+        # An artist's own, over the motion.
+        return []
     if any(track.is_solo for track in tracks):
         return [
             phrase("A solo NLA track of {name} hides the motion. Switch its star off.", name=name)

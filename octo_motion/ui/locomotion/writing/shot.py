@@ -12,10 +12,14 @@ import bpy
 import numpy as np
 
 from ....blender.animation import (
+    CYCLES,
     curves_of,
+    edit_layer,
+    follow,
     key_counts,
     play_bones,
     posed_channels,
+    quarters,
     read_object_channels,
     rest_channel,
     rest_properties,
@@ -37,6 +41,7 @@ from ....core.locomotion.motion import (
     schedule,
     shown_contacts,
 )
+from ....core.locomotion.path import plan_travel
 from ....core.locomotion.reaching import Carried
 from ....core.locomotion.rig import Detection
 from ....core.phrases import as_phrase, joined_phrases, phrase
@@ -308,8 +313,10 @@ class Shot:
     ) -> bpy.types.Action:
         """Write the keys, and lay to rest what the action before moved and this one does not."""
         previous = previous_action(armature, settings)
+        layer = edit_layer(armature, previous) if previous is not None else None
+        cycles = list(previous.get(CYCLES, ())) if previous is not None else []
         before = {previous}
-        if not settings.keep_pose:
+        if not settings.keep_pose and layer is None:
             # Whoever made it: its pose of one frame is nobody's.
             before.add(playing_action(armature))
         old = [action for action in before if action is not None]
@@ -319,7 +326,9 @@ class Shot:
         passing = {path for path in passing if bone_and_property(path)[0] not in left}
         channels = made.channels
         if not settings.keep_pose:
-            channels = [*channels, *self._at_rest(armature, made, passing, old)]
+            # What lies over the motion is no pose.
+            over = {curve.data_path for curve in curves_of(layer)} if layer is not None else set()
+            channels = [*channels, *self._at_rest(armature, made, passing | over, old)]
         # The settings' own pointer must not count as a user when it comes to saving an edited
         # action from being purged.
         settings.result = None
@@ -334,13 +343,26 @@ class Shot:
                 repeats=self.job.repeats,
                 replaceable=unedited,
                 automatic=made.automatic,
+                beneath=layer is not None,
             )
         except WriteError:
             settings.result = previous
             raise
         settings.result = action
+        action[CYCLES] = self._quarters(made)
+        if layer is not None:
+            assert previous is not None
+            follow(armature, layer, (previous, action), cycles)
         rest_properties(armature, passing - {each.data_path for each in channels})
         return action
+
+    @staticmethod
+    def _quarters(made: MotionResult) -> list[float]:
+        """Frames at which the gait passes quarters of its cycles."""
+        when, standing = made.plan.schedule, made.plan.first.standing
+        bearings = standing.bearings if standing is not None else None
+        travel = plan_travel(when.route, when.travel, when.times, bearings)
+        return quarters(when.frames, travel.phase)
 
     def _at_rest(
         self,
