@@ -286,7 +286,8 @@ def test_timing_shows_its_own_settings_and_the_result(timing: str) -> None:
     assert "frame_start" in Tab()["frames"]
     own = {"CADENCE": "cycle_time", "SPEED": "speed", "RANGE": "frame_end"}
     assert {name for name in own.values() if name in drawn} == {own[timing]}
-    assert drawn[-3:] == ["Octopus Locomotion", "25 frames, 1.0 s", "octo_motion.write_job"]
+    buttons = ["octo_motion.edit_on_top", "octo_motion.write_job"]
+    assert drawn[-4:] == ["Octopus Locomotion", "25 frames, 1.0 s", *buttons]
 
 
 def test_of_a_linked_armature_the_tab_says_that_it_is_read_only(tmp_path: Path) -> None:
