@@ -25,7 +25,7 @@ from ..gait import CYCLE
 from ..path import Line
 from .arm_curves import laid
 from .contact_timing import ContactTiming
-from .surface import Ground, Limbs, StanceSettings, normals, touching
+from .surface import Ground, HeightField, Limbs, StanceSettings, normals, touching
 
 PEELING: Final = 0.5
 """Share of a stance in which the arm is peeled off towards its tip, as the body pulls. At 0.2 an
@@ -318,6 +318,12 @@ def settled(
     return turns, farther
 
 
+_BESIDE: Final = np.arange(0.05, 0.85, 0.05)
+"""Arm lengths to the side at which an arm looks for ground that finds none where it wants it …"""
+_ROUND: Final = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+"""… and in which directions."""
+_BRIEF: Final = 0.2
+"""How many arm lengths farther are as bad as a hold that is cut down to nothing."""
 UNROLLING: Final = 0.3
 """Share of a stance in which the arm lies down, from where it first touches to its tip. At 0.1 an
 octopus that walks over bumps slips by 0.0012 arm lengths instead of 0.0005."""
@@ -427,6 +433,7 @@ def lay(
     curl = _curls(limbs, 0 * numbers if cyclic else numbers, seed)
     joint = limbs.touching(settings.planted)
     spot, lie, half = _places(roots, overridden.shift, ground, settings)
+    spot, half, firm = _over_gaps(roots, (overridden.shift, half), ground, settings, (spot, lie))
     spot = np.where(overridden.moved[..., None], overridden.places, spot)
     heading = np.where(overridden.turned, overridden.headings, np.arctan2(lie[..., 1], lie[..., 0]))
     # As if they were round.
@@ -440,7 +447,7 @@ def lay(
         touch_down=touch_down,
         lift_off=lift_off,
         middle=middles,
-        present=overridden.present,
+        present=overridden.present & (firm | overridden.moved),
         joints=joints,
         normals=normals(ground, joints),
         skins=skins,
@@ -519,6 +526,75 @@ def _unturned(path: _RootPath, shift: Floats, half: Floats) -> Floats:
         np.arccos(np.clip(np.sum(one * other, axis=-1), -1.0, 1.0)) for one, other in pairwise(ways)
     )
     return 1.0 / (1.0 + np.maximum(turned / _WOUND - 1.0, 0.0))
+
+
+def _over_gaps(
+    path: _RootPath,
+    times: tuple[Floats, Floats],
+    ground: Ground,
+    settings: StanceSettings,
+    places: tuple[Floats, Floats],
+) -> tuple[Floats, Floats, np.ndarray]:
+    """Footholds that would be over a gap, laid beside it.
+
+    Args:
+        path: of the arms' roots.
+        times: (arms, cycles) cycles by which a hold is shifted, and half of how long it is.
+        ground: what there is.
+        settings: how arms hold on.
+        places: (arms, cycles, 3) where they touch, (arms, cycles, 2) which way they lie from there.
+
+    Returns:
+        Places (arms, cycles, 3), half of the holds' times (arms, cycles), and whether there is one
+        at all (arms, cycles): an arm that finds no ground passes over the gap in the air.
+    """
+    (shift, half), (spot, lie) = times, places
+    firm = np.ones(shift.shape, dtype=bool)
+    if not isinstance(ground, HeightField) or ground.gaps is None:
+        return spot, half, firm
+    reach, limbs = _reach(path.limbs, settings), path.limbs
+    lying = np.broadcast_to(reach.whole - reach.free, shift.shape)
+    arm, cycle = np.nonzero(_in_gap(ground, spot, lie, lying))
+    if not len(arm):
+        return spot, half, firm
+    whole = reach.whole[arm, 0]
+    away, angle = (each.ravel() for each in np.meshgrid(_BESIDE, _ROUND, indexing="ij"))
+    aside = away[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    tried = np.repeat(spot[arm, cycle][:, None], len(aside), axis=1)
+    tried[..., :2] += whole[:, None, None] * aside
+    tried[..., 2] = ground.height(tried)
+    ways = np.broadcast_to(lie[arm, cycle][:, None], (*tried.shape[:2], 2))
+    good = ~_in_gap(ground, tried, ways, lying[arm, cycle][:, None])
+    far = _TAUT * reach.longer * limbs.reach[limbs.touching(settings.planted)]
+    # For as long as the arm reaches there.
+    best, share = np.full(good.shape, np.inf), np.zeros(good.shape)
+    for part in _SHORTENED:
+        ends = [path.at(shift + each * part * half)[0][arm, cycle] for each in (-1.0, 0.0, 1.0)]
+        apart = [np.linalg.norm(tried - each[:, None], axis=-1) for each in ends]
+        can = good & (np.max(apart, axis=0) <= far[arm, None]) & (share == 0.0)
+        best = np.where(can, away + _BRIEF * (1.0 - part), best)
+        share = np.where(can, part, share)
+    chosen = np.argmin(best, axis=1)
+    row = np.arange(len(arm))
+    spot, half = spot.copy(), half.copy()
+    spot[arm, cycle] = tried[row, chosen]
+    half[arm, cycle] *= np.maximum(share[row, chosen], min(_SHORTENED))
+    firm[arm, cycle] = np.isfinite(best[row, chosen])
+    return spot, half, firm
+
+
+def _in_gap(ground: HeightField, spot: Floats, lie: Floats, lying: Floats) -> np.ndarray:
+    """Whether arms (…) that lie from somewhere (…, 3) on would be over a gap with some of them.
+
+    They lie along unit vectors (…, 2), so many metres (…).
+    """
+    along = (lying[..., None] * _POINTS)[..., None]
+    found = np.zeros(spot.shape[:-1], dtype=bool)
+    # Where they are bent to one side, too.
+    for aside in (-0.5 * _CURL, 0.0, 0.5 * _CURL):
+        way = rotate_in_plane(lie, np.full(lie.shape[:-1], aside))
+        found |= ground.is_gap(spot[..., None, :2] + along * way[..., None, :]).any(axis=-1)
+    return found
 
 
 def relaid(footholds: Footholds, limbs: Limbs, ground: Ground, skins: Floats) -> Footholds:

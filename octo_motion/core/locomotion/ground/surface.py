@@ -40,6 +40,9 @@ _DEEPEST: Final = 6.0
 _ONE: Final = 1e-4
 """Share of a sample's width within which faces are at one height."""
 
+_HALF: Final = 0.5
+"""Of the way from a sample to the next: beyond it that one is nearer."""
+
 _single_known: Final[ContentCache[HeightField | None]] = ContentCache(3)
 _extents: Final[ContentCache[tuple[Floats, Floats]]] = ContentCache(3)
 
@@ -93,6 +96,15 @@ class HeightField:
     """Metres between samples."""
     heights: Floats
     """(nx, ny) world Z, at least 2 × 2."""
+    gaps: np.ndarray | None = None
+    """(nx, ny) where there is nothing between what there is: no arm can lie there."""
+
+    def is_gap(self, points: Floats) -> np.ndarray:
+        """Whether points (…, 2 or 3) are over a gap."""
+        if self.gaps is None:
+            return np.zeros(points.shape[:-1], dtype=bool)
+        (x, column), (y, row) = (self._place(points, axis) for axis in (0, 1))
+        return self.gaps[column + (x > _HALF), row + (y > _HALF)]
 
     def height(self, points: Floats) -> Floats:
         """World Z (…,)."""
@@ -138,7 +150,7 @@ class HeightField:
                 fall = (step * self.spacing) ** 2 / (2.0 * radius)
                 np.maximum(whole, _shifted(result, step, axis, -np.inf) - fall, out=whole)
             result = whole
-        return HeightField(self.origin, self.spacing, np.maximum(heights, result))
+        return HeightField(self.origin, self.spacing, np.maximum(heights, result), self.gaps)
 
     def _place(self, points: Floats, axis: int) -> tuple[Floats, np.ndarray]:
         """How far points are beyond the sample before them along an axis, and its number."""
@@ -181,6 +193,7 @@ def sample_ground(
     reach: float,
     spacing: float,
     headroom: float,
+    gap: float = 0.0,
     content: bytes | None = None,
     bare: float | None = None,
 ) -> HeightField:
@@ -197,6 +210,7 @@ def sample_ground(
         reach: metres to all sides of the path that are sampled.
         spacing: metres between samples.
         headroom: metres.
+        gap: metres without ground that are stepped over.
         content: a key of the faces' content, where it is known, so that they need not be looked at
             again for another path.
         bare: how high it is where there are no faces; without, as high as they are beside it.
@@ -222,17 +236,70 @@ def sample_ground(
     else:
         coarse = _near_path(grid, path, reach)
         heights = _beneath(triangles, grid, coarse(path[:, 2]) + headroom, lowest, highest)
-    inside = np.flatnonzero(needed)
-    missing = ~np.isfinite(heights[_nearest(grid, path[inside])])
-    if np.any(missing):
-        share = 100.0 * float(np.flatnonzero(missing)[0]) / max(len(inside) - 1, 1)
+    _check_below(path[needed], heights[_nearest(grid, path[needed])], gap)
+    if bare is not None:
+        return HeightField(grid.origin, spacing, np.where(np.isfinite(heights), heights, bare))
+    gaps = _gaps(np.isfinite(heights), int(0.5 * gap / spacing))
+    if gaps is None:
+        return single or HeightField(grid.origin, spacing, _filled(heights))
+    filled = single.heights if single is not None else _filled(heights)
+    return HeightField(grid.origin, grid.spacing, filled, gaps)
+
+
+def _check_below(path: Floats, heights: Floats, gap: float) -> None:
+    """Make sure that there is ground below points (n,) of a path, but for gaps.
+
+    Raises:
+        GroundError: there is none.
+    """
+    missing = ~np.isfinite(heights)
+    left = _leaves(path, missing, gap) if np.any(missing) else None
+    if left is not None:
+        share = 100.0 * left / max(len(path) - 1, 1)
         raise GroundError(
             phrase("The route leaves the ground after {share:.0f} % of its length.", share=share),
             "Move the route, or make the ground larger.",
         )
-    if bare is not None:
-        return HeightField(grid.origin, spacing, np.where(np.isfinite(heights), heights, bare))
-    return single or HeightField(grid.origin, spacing, _filled(heights))
+
+
+def _leaves(path: Floats, missing: np.ndarray, gap: float) -> int | None:
+    """The first of points (n, 3) from which on a path has no ground (n,) for longer than a gap, or
+    up to its end; none if there is no such.
+    """
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1))])
+    edges = np.flatnonzero(np.diff(np.pad(missing.astype(np.int8), 1)))
+    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        ends = first == 0 or last == len(missing)
+        if ends or along[last] - along[first - 1] > gap:
+            return first
+    return None
+
+
+def _gaps(there: np.ndarray, width: int) -> np.ndarray | None:
+    """Samples (nx, ny) that are not there, but between others that are, no further than so many to
+    either side; none if there are none.
+    """
+    if width < 1 or there.all():
+        return None
+    padded = np.pad(there, 2 * width)
+    near = _any_near(padded, width)
+    closed = ~_any_near(~near, width)[2 * width : -2 * width, 2 * width : -2 * width]
+    gaps = closed & ~there
+    return gaps if gaps.any() else None
+
+
+def _any_near(where: np.ndarray, width: int) -> np.ndarray:
+    """Whether any of the samples (nx, ny) so many to all sides is one of some."""
+    result = where
+    for axis in (0, 1):
+        sums = np.cumsum(result, axis=axis, dtype=np.int64)
+        count = sums.shape[axis]
+        ahead = np.take(sums, np.minimum(np.arange(count) + width, count - 1), axis=axis)
+        behind = np.take(sums, np.maximum(np.arange(count) - width - 1, 0), axis=axis)
+        first = np.arange(count) - width - 1 < 0
+        behind = np.where(first[:, None] if axis == 0 else first, 0, behind)
+        result = ahead > behind
+    return result
 
 
 def ground_along_path(path: Floats, *, reach: float, spacing: float, softness: float) -> Ground:

@@ -80,6 +80,8 @@ _HEADROOM: Final = 2.0
 """Arm lengths above the route up to which a surface is ground and not a roof."""
 _LOWEST: Final = 0.12
 """Arm lengths that a body is above its ground at least."""
+_GAP: Final = 1.0
+"""Arm lengths without ground that are stepped over."""
 _PATH_STEP: Final = 0.1
 """Arm lengths between the points of the route that the ground is looked for under."""
 
@@ -295,6 +297,7 @@ def _ground(
     inside = (distance >= 0.0) & (distance <= route.length)
     triangles, content = mesh
     sizes = {"reach": _AROUND * reach, "spacing": _FINE * reach, "headroom": _HEADROOM * reach}
+    sizes["gap"] = _GAP * reach
 
     def sampled() -> tuple[Ground, Ground]:
         ground = sample_ground(triangles, path, inside, **sizes, content=content)
