@@ -204,6 +204,10 @@ def described(group: str) -> dict[str, list[str]]:
             return rows(section("## Posing").split("### Pose scripts", 1)[0])
         case "splicing":
             return rows(section("## Splicing").split("An item of", 1)[0])
+        case "follow_through":
+            return rows(section("## Follow-through").split("An item of", 1)[0])
+        case "chain":
+            return rows(after("An item of `chains`:", "## Follow-through"))
         case "splice":
             return rows(after("An item of `splices`:", "## Splicing"))
         case "table":
@@ -215,6 +219,10 @@ def described(group: str) -> dict[str, list[str]]:
 
 
 def group_class(group: str) -> Any:
+    from octo_motion.ui.follow_through.properties import (
+        FollowChain,
+        OCTO_MOTION_PG_follow_through,
+    )
     from octo_motion.ui.locomotion.settings import body, lists, properties
     from octo_motion.ui.locomotion.settings import gait as gait_properties
     from octo_motion.ui.locomotion.settings import lists as ground_properties
@@ -241,6 +249,8 @@ def group_class(group: str) -> Any:
         "posing": OCTO_MOTION_PG_posing,
         "splicing": OCTO_MOTION_PG_splicing,
         "splice": SpliceItem,
+        "follow_through": OCTO_MOTION_PG_follow_through,
+        "chain": FollowChain,
     }
     return own.get(group) or getattr(gait_properties, f"OCTO_MOTION_PG_gait_{group}")
 
@@ -303,6 +313,7 @@ def number(value: float, definition: Any) -> str:
         "figure",
         *("table", "curve", "knot", "offset", "note"),
         *("splicing", "splice", "landmarks", "posing"),
+        *("follow_through", "chain"),
     ],
 )
 def test_every_setting_is_described_with_its_type_and_its_default(group: str) -> None:

@@ -15,6 +15,7 @@ from typing import Any, Final
 import bpy
 import contact_sheet
 import experiment
+import following
 import grounds
 import numpy as np
 import plot
@@ -200,6 +201,8 @@ PICTURES: Final[dict[str, Callable[[], Pixels]]] = {
     "pose_things": puppet_things.sheet,
     "puppet_plots": puppet_plots,
     "splices": splices,
+    "follow_braid": following.braid,
+    "follow_swim": following.swim,
 }
 """By file name."""
 

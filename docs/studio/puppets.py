@@ -175,8 +175,12 @@ def _arrow(start: Points, end: Points) -> None:
     )
 
 
-def make_doll() -> bpy.types.Object:
-    """An armature whose bones carry stiff parts of wood."""
+Limb = tuple[str, str, tuple[float, float, float], tuple[float, float, float], float]
+"""A bone: name, parent, head, tail and radius, metres."""
+
+
+def make_doll(more: Sequence[Limb] = ()) -> bpy.types.Object:
+    """An armature whose bones carry stiff parts of wood; with more bones, if there are any."""
     figure = bpy.data.objects.new("Doll", bpy.data.armatures.new("Doll"))
     stage.the_scene().collection.objects.link(figure)
     bpy.context.view_layer.objects.active = figure
@@ -184,7 +188,7 @@ def make_doll() -> bpy.types.Object:
     assert isinstance(figure.data, bpy.types.Armature)
     bones = figure.data.edit_bones
     thick: dict[str, float] = {}
-    for name, parent, head, tail, radius in _MIDDLE:
+    for name, parent, head, tail, radius in (*_MIDDLE, *more):
         bone = bones.new(name)
         bone.head, bone.tail = Vector(head), Vector(tail)
         bone.parent = bones.get(parent)

@@ -74,11 +74,25 @@ Settings have the names that scripts use: Object.octo_motion.splicing.retarget.N
 landmarks.NAME=BONE says which bone of the armature is which, where it cannot be told.
 """
 
+_FOLLOW: Final = """\
+Let chains of bones follow an armature's action: they lag, swing, stop at what is in their way and
+settle. The result is saved as a new file.
+
+FILE is a .blend file with the armature, or a motion file, and comes before --chain. Without any
+--chain it is the file's list of chains, or all bones whose names say that they hang and swing.
+
+  follow fox.blend --chain Tail.1 Tail.5 strength=0.5 --set damping=0.3 -o fox_tail.blend
+
+Settings have the names that scripts use: Object.octo_motion.follow_through.NAME. Here, the result
+is a new action unless --set result_as says otherwise.
+"""
+
 _ABOUT: Final = {
     "generate": ("let the armature of one file walk or swim", _GENERATE),
     "splice": ("put parts of other motions onto one motion", _SPLICE),
     "pose": ("pose an armature by a script", _POSE),
     "retarget": ("put whole clips onto one armature", _RETARGET),
+    "follow": ("let bones follow an action", _FOLLOW),
 }
 _BAKE: Final = """\
 Make many shots from a job file, each in a process of its own.
@@ -130,6 +144,12 @@ radians, texts may be in degrees.
   kind = "retarget"                 # whole clips onto this one, each as an action
   file = "hero.blend"
   clips = ["clips", "more/throw.bvh"]   # files, and folders of files
+
+  [[shots]]
+  name = "fox_tail"
+  kind = "follow"                   # bones that follow an action
+  file = "fox.blend"
+  chains = [{ name = "Tail.1", last = "Tail.5", strength = 0.5 }]
 """
 
 

@@ -27,6 +27,7 @@ from ..ui.locomotion import (
     store,
 )
 from ..ui.posing import play_file
+from .follow_runner import follow
 from .job_report import ShotSummary, check_limits
 from .outputs import blender_said, check_export, export
 from .retarget_runner import retarget
@@ -68,7 +69,7 @@ def perform(
         LimitError: the motion is not as good as it has to be; nothing has been written.
     """
     clips = Clips()
-    takes_motion = shot.kind in {"splice", "retarget"}
+    takes_motion = shot.kind in {"splice", "retarget", "follow"}
     motion = shot.file if takes_motion and shot.file and is_motion(shot.file) else None
     if motion is not None:
         armature, clips = import_base(motion, shot.fps)
@@ -88,6 +89,10 @@ def perform(
             summary = splice(armature, shot, clips, motion)
         elif shot.kind == "retarget":
             summary = retarget(armature, shot)
+        elif shot.kind == "follow":
+            if motion is not None and not shot.base:
+                clips.action(motion, "")
+            summary = follow(armature, shot)
         elif shot.script is not None:
             summary = _pose(armature, scene, shot.script)
         else:

@@ -97,7 +97,8 @@ class ShotRequest:
     gait: str | Path = ""
     """The gait table as JSON, a file that is still to be read, or "" for the armature's own."""
     changes: list[Settings] | None = None
-    """Items of the list, as in the file if not given; so are the next two."""
+    """Items of the list, as in the file if not given; so are the next two. Of a shot that follows,
+    its chains."""
     reaches: list[Settings] | None = None
     contacts: list[Settings] | None = None
     script: Path | None = None
@@ -383,6 +384,33 @@ def parse_splices(options: Iterable[Sequence[str]]) -> list[dict[str, str]]:
     return tables
 
 
+CHAINS: Final = Tables(
+    Table(known="chains", example='{ name = "Tail.1", last = "Tail.5" }', needed=("name",)),
+    "chain",
+    if_empty="chains is empty: write which bones follow, or leave the key out.",
+)
+
+
+def parse_chains(options: Iterable[Sequence[str]]) -> list[dict[str, str]]:
+    """The tables that words of the command line mean: each a first bone, a last one, NAME=VALUE.
+
+    Raises:
+        SettingsError: one has more than one last bone.
+    """
+    tables = []
+    for first, *words in options:
+        last = [word for word in words if "=" not in word]
+        if len(last) > 1:
+            raise SettingsError(
+                f"--chain {first} has two last bones, '{last[0]}' and '{last[1]}'.",
+                "Write --chain FIRST LAST NAME=VALUE, with the file to read before it.",
+            )
+        values = (word for word in words if "=" in word)
+        table = {"name": first, **parse_assignments(values, f"--chain {first}")}
+        tables.append(table | ({"last": last[0]} if last else {}))
+    return tables
+
+
 def _items(name: str, example: str, *needed: str) -> Key:
     """A list of what the panels keep in a list of that name."""
     return Key(Tables(Table(known=name, example=example, needed=needed), name))
@@ -413,7 +441,7 @@ def _kind(own: dict[str, Key], exported: str) -> dict[str, Key]:
     output = Option("the .blend file to write", "FILE", ("-o", "--output"))
     return {
         "name": Key(_shot_name),
-        "kind": Key(Choice(("generate", "splice", "pose", "retarget"), "kind")),
+        "kind": Key(Choice(("generate", "splice", "pose", "retarget", "follow"), "kind")),
         **own,
         "fps": Key(Number(1.0, HIGHEST_FPS), Option("frames per second of the scene", "FPS")),
         "output": Key(File("format to save to", (".blend",), is_written=True), output),
@@ -510,6 +538,27 @@ KINDS: Final[dict[str, dict[str, Key]]] = {
         },
         "the armature and what hangs on it",
     ),
+    "follow": _kind(
+        {
+            "file": _file("the .blend or motion file with the action, before any --chain"),
+            "armature": _named("default: the only one, or the active one"),
+            "base": _named("the action to follow; default: the armature's own", "ACTION"),
+            "chains": Key(
+                CHAINS,
+                Option(
+                    "first and last bone of a chain, and settings of it; may be repeated; default: "
+                    "the file's list, or what hangs loose by its names",
+                    ("FIRST", "LAST NAME=VALUE"),
+                    ("--chain",),
+                    parse_chains,
+                ),
+            ),
+            "settings": _settings(
+                "follow", "a setting, such as material=limp, gravity=1 or damping=0.4"
+            ),
+        },
+        "the armature and what hangs on it",
+    ),
 }
 """The keys of each kind of shot."""
 
@@ -592,11 +641,21 @@ def _check_retarget(values: dict[str, Any], reading: Reading) -> dict[str, Any]:
     return {**values, "splices": [NewSplice(clip=path) for path in clips or ()]}
 
 
+def _check_follow(values: dict[str, Any], reading: Reading) -> dict[str, Any]:
+    values = dict(values)
+    if "file" not in values and not reading.has_open_file:
+        reading.fault('It has no armature: give file, "….blend" or a motion file.')
+    if "chains" in values:
+        values["changes"] = values.pop("chains")
+    return values
+
+
 _CHECKS: Final = {
     "generate": _check_generate,
     "splice": _check_splice,
     "pose": _check_pose,
     "retarget": _check_retarget,
+    "follow": _check_follow,
 }
 
 

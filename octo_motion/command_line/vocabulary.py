@@ -16,6 +16,7 @@ from ..blender.files import load_gait, read_gait_file
 from ..core.errors import ClipError, OctoMotionError, SettingsError
 from ..core.locomotion.gait import gait_to_json
 from ..core.splicing.clip import MOTION_SUFFIXES, check_bvh
+from ..ui.follow_through import FollowChain, OCTO_MOTION_PG_follow_through
 from ..ui.locomotion import ChangeItem, ContactItem, OCTO_MOTION_PG_locomotion, ReachItem
 from ..ui.splicing import (
     PARTS,
@@ -31,7 +32,12 @@ _OWN_KEYS = {"name", "gait"}
 """No settings: Blender's own name of a group, and the gait, which a shot names itself."""
 BACKSLASHES = "Write / between folders: every system takes it."
 """What to do about paths as Windows writes them."""
-_LISTED = {"changes": ChangeItem, "reaches": ReachItem, "contacts": ContactItem}
+_LISTED = {
+    "changes": ChangeItem,
+    "reaches": ReachItem,
+    "contacts": ContactItem,
+    "chains": FollowChain,
+}
 """What the items are of the lists that a shot may have."""
 
 
@@ -42,6 +48,10 @@ def known() -> Known:
         {
             "generate": dict(_settings(OCTO_MOTION_PG_locomotion)),
             "splice": dict(_settings(OCTO_MOTION_PG_splicing)),
+            "follow": {
+                **dict(_settings(OCTO_MOTION_PG_follow_through)),
+                "wind": point,
+            },
             "retarget": {
                 **dict(_settings(OCTO_MOTION_PG_retarget)),
                 **dict(_settings(OCTO_MOTION_PG_landmarks, "landmarks.")),

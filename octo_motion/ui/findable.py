@@ -26,13 +26,15 @@ _ENTRIES: Final = (
     ("pose_start", phrase("Pose by Hand"), "VIEW_PAN"),
     ("pose_device", phrase("Pose with Device"), "ORIENTATION_GIMBAL"),
     ("pose_script", phrase("Play Pose Script…"), "FILE_SCRIPT"),
+    (),
+    ("follow_through", phrase("Follow Through"), "FORCE_HARMONIC"),
 )
 """Operators, what they are called here, and their icons; nothing for a line between."""
 
 
 class OCTO_MOTION_MT_tools(bpy.types.Menu):
     bl_label = "Octo Motion"
-    bl_description = "Walk, swim, splice clips, pose by hand"
+    bl_description = "Walk, swim, splice clips, pose by hand, follow through"
 
     def draw(self, context: bpy.types.Context | None) -> None:
         layout = cast("Any", self).layout

@@ -9,8 +9,9 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from . import at_work, findable, language, locomotion, posing, splicing
+from . import at_work, findable, follow_through, language, locomotion, posing, splicing
 from .declared_settings import PointerProperty, make_overridable
+from .follow_through import OCTO_MOTION_PG_follow_through
 from .locomotion import OCTO_MOTION_PG_contact, OCTO_MOTION_PG_locomotion, keep_look, stamp
 from .posing import OCTO_MOTION_PG_posing
 from .splicing import OCTO_MOTION_PG_splicing
@@ -40,6 +41,11 @@ class OCTO_MOTION_PG_object(bpy.types.PropertyGroup):
         name="Posing",
         description="How the armature is posed by hand, and what stops it",
         type=OCTO_MOTION_PG_posing,
+    )
+    follow_through: PointerProperty(
+        name="Follow-Through",
+        description="Which bones lag and swing about an action, and how",
+        type=OCTO_MOTION_PG_follow_through,
     )
     chosen_tool: chosen()
     tool: switch()
@@ -103,6 +109,7 @@ CLASSES: tuple[type, ...] = (
     *splicing.SETTINGS,
     *splicing.CLASSES,
     *posing.CLASSES,
+    *follow_through.CLASSES,
     *findable.CLASSES,
     OCTO_MOTION_PG_object,
 )

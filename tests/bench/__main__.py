@@ -10,7 +10,7 @@ Each measurement has a process of its own.
 A first word measures one thing: "splicing" the quality of splices, "live" how fast a walk follows
 a change, "apart" how far arms pass through each other, "keys" how many keys *Few* leaves of each
 gait, "device" how well the loop at the devices keeps time, "posing" how long a step of the plastic
-puppet takes. Their own --help tells more.
+puppet takes, "follow" how long follow-through takes. Their own --help tells more.
 
 --write measures all that docs/speed.md, docs/quality.md and docs/apart.md show, or the sections
 that are named after it, keeps it in tests/bench/figures.json and writes it into the pages. Recorded
@@ -35,6 +35,7 @@ _APART: Final = {
     "apart": "apart",
     "keys": "few_keys",
     "device": "device_loop",
+    "follow": "follow_through",
 }
 """First words, and the modules that they run."""
 _SHORT: Final = ("comparison",)

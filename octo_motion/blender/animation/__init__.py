@@ -52,7 +52,8 @@ from .poses import (
     standing_of,
 )
 from .scene_playback import play_bones, time_kept
-from .spliced_action import STEP, SplicedMotion, write_layer, write_spliced
+from .splice_layer import layers_off
+from .spliced_action import STEP, SplicedMotion, write_into, write_layer, write_spliced
 
 __all__ = [
     "CYCLES",
@@ -82,6 +83,7 @@ __all__ = [
     "key_points",
     "lasting",
     "lay_edits",
+    "layers_off",
     "mark_file_changed",
     "may_replace",
     "note_of",
@@ -111,6 +113,7 @@ __all__ = [
     "writable_object",
     "write_action",
     "write_clip",
+    "write_into",
     "write_layer",
     "write_spliced",
 ]

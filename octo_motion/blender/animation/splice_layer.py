@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import bpy
 
 from ...core.errors import WriteError
@@ -87,6 +90,23 @@ def take_off(armature: bpy.types.Object, action: bpy.types.Action | None) -> Non
             data.nla_tracks.remove(track)
         if key in mark:
             del mark[key]
+
+
+@contextmanager
+def layers_off(armature: bpy.types.Object, action: bpy.types.Action | None) -> Iterator[None]:
+    """The track of a layer that was made here is muted for a while: what is beneath shows."""
+    data = armature.animation_data
+    track = None
+    if action is not None and data is not None and MARK in action:
+        track = data.nla_tracks.get(action[MARK].get(_TRACK, ""))
+    if track is None or track.mute:
+        yield
+        return
+    track.mute = True
+    try:
+        yield
+    finally:
+        track.mute = False
 
 
 def _plays(data: bpy.types.AnimData, base: bpy.types.Action) -> bool:

@@ -17,6 +17,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.errors import WriteError
 from ...core.keyframes import (
     STEP,
     Channel,
@@ -28,6 +29,7 @@ from ...core.keyframes import (
     runs_of,
     stretch_keys,
 )
+from ...core.phrases import phrase
 from ...core.rotations import Floats
 from ...core.splicing.clip import Clip
 from ..rig import pose_of
@@ -45,7 +47,7 @@ from .actions import (
     writable_armature,
 )
 from .clips import bone_channels, location_axes, slot_of
-from .fcurves import evaluate_fcurve
+from .fcurves import KeyArrays, bezier_arrays, evaluate_fcurve, replace_stretch, write_keys
 from .kept_curves import (
     can_be_cut,
     copy_curve,
@@ -53,7 +55,6 @@ from .kept_curves import (
     key_ends,
     straight_keys,
     write_baked,
-    write_kept_keys,
     write_stretches,
 )
 from .poses import AT_REST, UnkeyedPose, keep_unkeyed_pose, unkeyed_pose
@@ -93,6 +94,8 @@ class SplicedMotion:
     """The result on all whole frames, for bones that get keys on each of them, …"""
     bones: Collection[str] = ()
     """… and which these are."""
+    channels: Sequence[Channel] = ()
+    """What else is otherwise, on all of the base's frames: their own keys, or one on each frame."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +146,7 @@ def write_spliced(
     result = generated_action(armature, name, previous)
     take_off(armature, result)
     writer = _Writer(own_channelbag(result, result.slots[0]), motion)
-    otherwise = {each.path for each in changed}
+    otherwise = {each.path for each in changed} | {each.data_path for each in motion.channels}
     for path, components in base.items():
         for component, curve in components.items():
             writer.copy(path, component, curve, keys=path not in otherwise)
@@ -185,7 +188,7 @@ def write_layer(
     _write_changed(armature, writer, changed, base)
     ends = [each.frames[[0, -1]] for found in changed for each in found.stretches]
     first, last = motion.first, motion.last
-    if ends and motion.anew is None:
+    if ends and motion.anew is None and not motion.channels:
         first, last = float(np.min(ends)), float(np.max(ends))
     writer.keep_between(first, last)
     result.use_cyclic, result.use_frame_range = False, True
@@ -204,6 +207,8 @@ def _write_changed(
     if motion.anew is not None:
         for channel in bone_channels(armature, motion.anew, motion.bones):
             writer.replace(channel, motion.anew.frames)
+    for channel in motion.channels:
+        writer.replace(channel, motion.base.frames)
     writer.finish()
 
 
@@ -412,13 +417,12 @@ class _Writer:
             write_baked(curve, own, pieces, frames, changed.bound)
 
     def replace(self, channel: Channel, frames: Floats) -> None:
-        """A property that has a key on each frame (frames,)."""
+        """A property that has a key on each frame (frames,), or keys of its own."""
         for component in range(channel.values.shape[1]):
             curve = self._curve(channel.data_path, component, channel.group)
             for modifier in list(curve.modifiers):
                 curve.modifiers.remove(modifier)
-            points = np.column_stack([frames, channel.values[:, component]])
-            write_kept_keys(curve, straight_keys(points))
+            write_keys(curve, channel_keys(channel, component, frames))
 
     def keep_between(self, first: float, last: float) -> None:
         """Let curves have no keys but between two frames, and at both."""
@@ -455,6 +459,48 @@ class _Writer:
             curve.group = group_named(self._channelbag, group)
         self._made[place] = curve
         return curve
+
+
+def channel_keys(channel: Channel, component: int, frames: Floats) -> KeyArrays:
+    """Keys of one component: the channel's own, or straight ones on each frame (frames,)."""
+    if channel.keys is not None:
+        return bezier_arrays(channel.keys, component)
+    return straight_keys(np.column_stack([frames, channel.values[:, component]]))
+
+
+def write_into(
+    armature: bpy.types.Object,
+    action: bpy.types.Action,
+    slot: bpy.types.ActionSlot | None,
+    frames: Floats,
+    channels: Sequence[Channel],
+) -> None:
+    """Put channels into an action itself, in place of the keys that it has between two frames.
+
+    Args:
+        armature: the armature object.
+        action: the action.
+        slot: its slot; if none is given the one that the armature uses, or would.
+        frames: (frames,) of the channels' values.
+        channels: what is otherwise.
+
+    Raises:
+        WriteError: the armature or the action is read-only.
+    """
+    writable_armature(armature)
+    if not action.is_editable:
+        raise WriteError(
+            phrase("The action '{action}' is linked and read-only.", action=action.name),
+            "Choose New Layer or New Action as the Result.",
+        )
+    channelbag = own_channelbag(action, slot or slot_of(armature, action))
+    for channel in channels:
+        for component in range(channel.values.shape[1]):
+            curve = channelbag.fcurves.find(channel.data_path, index=component)
+            if curve is None:
+                curve = channelbag.fcurves.new(channel.data_path, index=component)
+                curve.group = group_named(channelbag, channel.group)
+            replace_stretch(curve, channel_keys(channel, component, frames))
 
 
 def _cuts(stretch: Stretch) -> Floats:

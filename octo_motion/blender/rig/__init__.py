@@ -30,6 +30,7 @@ from .armature import (
     world_of,
 )
 from .controlled_puppet import puppet_of
+from .limb_figures import LimbReader
 from .puppet import Puppet
 from .puppet_reading import (
     PuppetRig,
@@ -43,6 +44,7 @@ from .puppet_reading import (
 __all__ = [
     "ALIGNED",
     "SUCKER_PROPERTY",
+    "LimbReader",
     "Puppet",
     "PuppetRig",
     "active_armature",

@@ -517,6 +517,11 @@ def _read_skin(armature: bpy.types.Object, skeleton: Skeleton) -> _Skin:
     )
 
 
+def skin_points(armature: bpy.types.Object, skeleton: Skeleton) -> Mapping[int, Floats]:
+    """Points (points, 3) of the skin as shown now, world, by the bone that moves them most."""
+    return _read_skin(armature, skeleton).points
+
+
 def is_part_of(item: bpy.types.Object, armature: bpy.types.Object) -> bool:
     """Whether an object goes along with an armature: as its skin, or hung on it."""
     above: bpy.types.Object | None = item

@@ -11,7 +11,7 @@ from . import (
     properties,
     script_player,
 )
-from .properties import OCTO_MOTION_PG_posing
+from .properties import OCTO_MOTION_PG_posing, marked_obstacles
 from .script_player import play_file
 
 CLASSES = (
@@ -23,4 +23,4 @@ STEPS = (
     Step(nothing, device_pose.unregister),
 )
 
-__all__ = ["CLASSES", "STEPS", "OCTO_MOTION_PG_posing", "play_file"]
+__all__ = ["CLASSES", "STEPS", "OCTO_MOTION_PG_posing", "marked_obstacles", "play_file"]

@@ -37,6 +37,8 @@ from .figure import (
 )
 from .joint_limits import bends, slopes
 from .materials import (
+    GRAVITY,
+    MATERIALS,
     Bend,
     JointCoefficients,
     Material,
@@ -54,6 +56,8 @@ __all__ = [
     "DENSITY",
     "FOLLOW",
     "FREE",
+    "GRAVITY",
+    "MATERIALS",
     "SIZE",
     "SMALLEST",
     "Bend",

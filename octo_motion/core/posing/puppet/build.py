@@ -84,13 +84,15 @@ def build_figure(
     *,
     skin: Mapping[int, Floats] | None = None,
     limits: Mapping[str, JointLimits] | None = None,
+    thick: float = _THICK,
 ) -> tuple[Figure, Pose]:
     """Rigid bodies for the bones that are bodies, jointed as the bones stand now, and that pose.
 
     Joints are where the pose has them, so that a bone that was moved away from its parent stays
     there, and a pose beyond a limit widens it: a puppet that is taken up does not move. The joints'
     elements are without strength; see the presets. ``skin`` has points (points, 3), world, by the
-    bone that moves them most; limbs without are slim. ``limits`` are by name of the bone.
+    bone that moves them most; limbs without are slim. ``limits`` are by name of the bone. Limbs are
+    as ``thick`` as so many of a hundred points are within.
     """
     bones = list(roles.bodies)
     parents = np.array(roles.parents)
@@ -103,7 +105,7 @@ def build_figure(
     anchors = joints_of(roles.parents, Pose(heads, rotations))
     rest = _in_parents(parents, multiply(posed.turn, skeleton.rest_rotations[bones]))
 
-    radius = _radii(roles, heads, ends, clouds)
+    radius = _radii(roles, heads, ends, clouds, thick)
     along = axes / lengths[:, None]
     inset = np.minimum(radius, 0.5 * lengths)
     # Caps end where the limb does; one that is shorter than it is thick becomes a ball.
@@ -182,7 +184,9 @@ def _end_of_skin(head: Floats, cloud: Floats) -> Floats:
     return head + way / size * max(float(np.percentile((cloud - head) @ way / size, _FAR)), 0.0)
 
 
-def _radii(roles: Roles, heads: Floats, ends: Floats, clouds: Sequence[Floats]) -> Floats:
+def _radii(
+    roles: Roles, heads: Floats, ends: Floats, clouds: Sequence[Floats], thick: float
+) -> Floats:
     """Radius of each limb: of the skin about it, of its neighbours' or else slim."""
     count = len(heads)
     axes = ends - heads
@@ -194,7 +198,7 @@ def _radii(roles: Roles, heads: Floats, ends: Floats, clouds: Sequence[Floats]) 
             offset = cloud - heads[body]
             share = np.clip(offset @ along, 0.0, lengths[body])
             apart = np.linalg.norm(offset - share[:, None] * along, axis=1)
-            radius[body] = np.percentile(apart, _THICK)
+            radius[body] = np.percentile(apart, thick)
     known = radius.copy()
     for body in np.flatnonzero(np.isnan(known)):
         near = [each for each, parent in enumerate(roles.parents) if parent == body]

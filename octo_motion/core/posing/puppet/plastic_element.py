@@ -131,6 +131,10 @@ class PlasticLaw:
         """−K_f q_f (joints, 3), the load at rest without flow."""
         return -self.stiffness[:, None] * spring
 
+    def drawn(self, speed: Floats) -> Floats:
+        """G w (joints, 3), the load on what stands still while the spring's rest turns with w."""
+        return self.backward[:, None] * speed
+
     def respond(self, at_rest: Floats, speed: Floats) -> ElementResponse:
         """The response from the load at rest (joints, 3) and w (joints, 3) at the step's end."""
         return self.answer(at_rest - self.backward[:, None] * speed)
@@ -183,6 +187,9 @@ class AxisLaw(PlasticLaw):
 
     def at_rest(self, spring: Floats) -> Floats:
         return self._along(-self._stiff, spring)
+
+    def drawn(self, speed: Floats) -> Floats:
+        return (self.diagonal @ speed[:, :, None])[:, :, 0]
 
     def respond(self, at_rest: Floats, speed: Floats) -> ElementResponse:
         return self.answer(at_rest - (self.diagonal @ speed[:, :, None])[:, :, 0])

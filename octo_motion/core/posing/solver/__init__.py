@@ -2,16 +2,30 @@
 """What moves a puppet: one step of a rigid-body world with plastic joints and contacts."""
 
 from .blas_threads import OneThread
+from .carried_world import CarriedWorld, Leading
+from .contact_detection import CarriedCapsules
 from .holds import Coupling, HandSpring
-from .obstacle_shapes import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
+from .obstacle_shapes import (
+    Box,
+    Capsule,
+    Hull,
+    Mesh,
+    Obstacle,
+    Plane,
+    Sphere,
+    nearest_on_segments,
+)
 from .world import World, WorldSettings, WorldSnapshot
 
 __all__ = [
     "Box",
     "Capsule",
+    "CarriedCapsules",
+    "CarriedWorld",
     "Coupling",
     "HandSpring",
     "Hull",
+    "Leading",
     "Mesh",
     "Obstacle",
     "OneThread",
@@ -20,4 +34,5 @@ __all__ = [
     "World",
     "WorldSettings",
     "WorldSnapshot",
+    "nearest_on_segments",
 ]

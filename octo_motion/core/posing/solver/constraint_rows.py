@@ -239,6 +239,9 @@ class Rows:
         asked = contacts.normals * (-self.gains * self.rates)[:, None]
         if self.grips is not None:
             asked += self.grips
+        if contacts.speeds is not None:
+            # What counts is how fast the point moves over the surface that it touches.
+            asked += self.gains[:, None] * contacts.speeds
         if holds is None:
             self.asked = asked
             return
@@ -270,6 +273,8 @@ class Rows:
     def slip_at(self, velocities: Floats) -> Floats:
         """(contacts,) the same at spatial velocities (bodies, 6)."""
         normals, w = self.contacts.normals, self.speeds(velocities)[: self.count]
+        if self.contacts.speeds is not None:
+            w = w - self.contacts.speeds
         across = w - ((w * normals) @ _ONES)[:, None] * normals
         return self.pattern.friction * np.sqrt((across * across) @ _ONES)
 

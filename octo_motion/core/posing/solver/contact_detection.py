@@ -12,7 +12,7 @@ nearest face a thin board would let it out on the other side.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from operator import attrgetter
 from typing import Final
 from weakref import WeakKeyDictionary
@@ -44,9 +44,27 @@ class Contacts:
     """(contacts,) less than 0 where they overlap."""
     labels: Integers
     """(contacts,) the same number for the same place on the same thing in every step."""
+    speeds: Floats | None = None
+    """(contacts, 3) velocity of the obstacle's surface there, m/s; None where all stand still."""
 
     def __len__(self) -> int:
         return len(self.bodies)
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedCapsules:
+    """Capsules that something else moves, whatever touches them."""
+
+    ends: Floats
+    """(capsules, 2, 3) of their axes, world."""
+    radii: Floats
+    """(capsules,)"""
+    speeds: Floats
+    """(capsules, 2, 3) of the ends, m/s."""
+    meets: Flags
+    """(bodies, capsules) which of the figure's bodies each can touch, …"""
+    slack: Floats
+    """… (bodies, capsules) and how far it has to be in it for that, m."""
 
 
 _NOBODY: Final = np.zeros(0, np.int64)
@@ -74,9 +92,17 @@ class _Touched:
 class Detector:
     """Finds the contacts of one figure; what hangs on the figure alone is worked out once."""
 
-    def __init__(self, figure: Figure, *, self_collision: bool, apart: Flags | None = None) -> None:
+    def __init__(
+        self,
+        figure: Figure,
+        *,
+        self_collision: bool,
+        apart: Flags | None = None,
+        stands: Pose | None = None,
+    ) -> None:
         """Bodies of different owners push each other away but for those that are not ``apart``
-        (bodies, bodies), see ``apart_at``.
+        (bodies, bodies), see ``apart_at``. Limbs of one figure that overlap where it stands, or at
+        rest where that is not said, never collide.
         """
         self._radii = figure.radii
         self._ends = figure.capsules.copy()
@@ -88,7 +114,7 @@ class Detector:
         self._long = lengths > 1e-6 * figure.radii + _TINY
         most = float(np.max(lengths / np.maximum(figure.radii, _TINY), initial=1.0))
         self._samples = int(min(max(np.ceil(most) + 1, 3), _MOST_SAMPLES))
-        self._all_pairs = _pairs(figure, self._owners, self_collision=self_collision)
+        self._all_pairs = _pairs(figure, self._owners, stands, self_collision=self_collision)
         if apart is not None and self._all_pairs is not None:
             self._all_pairs &= apart
         # What was worked out of obstacles, kept as long as they are the same ones.
@@ -157,6 +183,38 @@ class Detector:
         self._planes.clear()
         pairs = self._all_pairs
         self._pairs = pairs if pairs is None or not bodies else pairs & bare & bare[:, None]
+
+    def find_carried(
+        self, positions: Floats, matrices: Floats, carried: CarriedCapsules, margin: float
+    ) -> Contacts:
+        """The same with capsules that something else moves."""
+        ends = self._ends @ matrices.transpose(0, 2, 1)
+        ends += positions[:, None]
+        low, high = self._boxes(ends, margin)
+        around = carried.radii[:, None]
+        own_low = np.minimum(carried.ends[:, 0], carried.ends[:, 1]) - around
+        own_high = np.maximum(carried.ends[:, 0], carried.ends[:, 1]) + around
+        near = carried.meets & (low[:, None] <= own_high).all(axis=2)
+        near &= (high[:, None] >= own_low).all(axis=2)
+        bodies, which = np.nonzero(near)
+        if not len(bodies):
+            return _NONE
+        on_body, on_other = nearest_on_segments(ends[bodies], carried.ends[which])
+        away = on_body - on_other
+        distance = np.sqrt((away * away).sum(axis=-1))
+        gaps = distance - self._radii[bodies] - carried.radii[which] + carried.slack[bodies, which]
+        touching = np.flatnonzero((gaps < margin) & (distance > _TINY))
+        if not len(touching):
+            return _NONE
+        bodies, which, gaps = bodies[touching], which[touching], gaps[touching]
+        normals = away[touching] / distance[touching, None]
+        points = on_body[touching] - normals * self._radii[bodies, None]
+        # Below all others: what obstacles there are may change.
+        labels = -1 - (bodies * len(carried.radii) + which)
+        share = _share(carried.ends[which], on_other[touching])
+        speeds = carried.speeds[which, 0] * (1.0 - share) + carried.speeds[which, 1] * share
+        others = np.full(len(bodies), -1)
+        return Contacts(bodies, others, points, normals, gaps, labels, speeds)
 
     def _boxes(self, ends: Floats, margin: float) -> tuple[Floats, Floats]:
         around = (self._radii + margin)[:, None]
@@ -338,6 +396,18 @@ def _has_shape(obstacle: Obstacle, bodies: int) -> bool:
     return obstacle.body < bodies and isinstance(obstacle, Box | Hull)
 
 
+def _share(ends: Floats, points: Floats) -> Floats:
+    """(rows, 1) how far along segments (rows, 2, 3) points (rows, 3) on them are."""
+    along = ends[:, 1] - ends[:, 0]
+    square = np.maximum((along * along).sum(axis=1), _TINY)
+    return (((points - ends[:, 0]) * along).sum(axis=1) / square)[:, None]
+
+
+def joined_contacts(found: Sequence[Contacts]) -> Contacts:
+    """All of them, in this order."""
+    return _joined([each for each in found if len(each)])
+
+
 def _middle(shares: Floats, distances: Floats, slack: Floats) -> Floats:
     """(rows,) the middle of the samples that are as near as the nearest: of a flat top, its."""
     least = distances <= distances.min(axis=1, keepdims=True) + slack[:, None]
@@ -362,9 +432,12 @@ def _separate_ends(figure: Figure) -> Flags:
     return keep
 
 
-def _pairs(figure: Figure, owners: Integers, *, self_collision: bool) -> Flags | None:
+def _pairs(
+    figure: Figure, owners: Integers, stands: Pose | None, *, self_collision: bool
+) -> Flags | None:
     """(bodies, bodies) which capsules may collide: those of different owners, and limbs of one
-    figure that are no neighbours and do not overlap at rest. None where none may.
+    figure that are no neighbours and do not overlap where it stands, or at rest. None where none
+    may.
     """
     strangers = np.triu(owners[:, None] != owners, 1)
     if not self_collision:
@@ -375,7 +448,7 @@ def _pairs(figure: Figure, owners: Integers, *, self_collision: bool) -> Flags |
         if parent >= 0:
             allowed[parent, body] = False
             allowed[np.ix_([body], np.flatnonzero(parents == parent))] = False
-    return (allowed & apart_at(figure, rest_pose(figure))) | strangers
+    return (allowed & apart_at(figure, stands or rest_pose(figure))) | strangers
 
 
 def apart_at(figure: Figure, pose: Pose) -> Flags:
@@ -390,7 +463,7 @@ def apart_at(figure: Figure, pose: Pose) -> Flags:
     return apart
 
 
-_columns: Final = attrgetter(*(each.name for each in fields(Contacts)))
+_columns: Final = attrgetter(*(each.name for each in fields(Contacts) if each.name != "speeds"))
 
 
 def _joined(found: list[Contacts]) -> Contacts:
@@ -398,7 +471,12 @@ def _joined(found: list[Contacts]) -> Contacts:
         return _NONE
     if len(found) == 1:
         return found[0]
-    return Contacts(*(np.concatenate(column) for column in zip(*map(_columns, found), strict=True)))
+    columns = (np.concatenate(column) for column in zip(*map(_columns, found), strict=True))
+    speeds = None
+    if any(each.speeds is not None for each in found):
+        still = (np.zeros((len(each), 3)) if each.speeds is None else each.speeds for each in found)
+        speeds = np.concatenate([*still])
+    return replace(Contacts(*columns), speeds=speeds)
 
 
 _AROUND: Final = np.linspace(-1.0, 1.0, 7)

@@ -121,6 +121,8 @@ class Newton:
         """
         self._tree.place(problem.joints)
         self._base = problem.law.at_rest(problem.springs)
+        if problem.driven is not None:
+            self._base = self._base + problem.law.drawn(problem.driven)
         self._held = problem.step * self._base
         stack = self._stack(problem, 1 if corrections is None else 2)
         point, tangents = self._begin(problem, start)
@@ -256,6 +258,11 @@ class Newton:
             self._slopes = tangents.slopes
             self._joint_blocks[tree.joint_slot] = tangents.slopes
         self._joint_right[tree.joint_slot] = tangents.right
+        if problem.carried is not None:
+            # Held so firmly that what hangs on them changes nothing.
+            firm = _FIRM * float(problem.masses.sum())
+            self._joint_blocks[tree.carried_slots] = firm * _UNIT
+            self._joint_right[tree.carried_slots] = firm * problem.carried
         right = tree.fill(stack, self._joint_blocks)
         right[: 3 * len(self._joint_right)] += self._joint_right.reshape(-1, 1)
         if planes is not None and len(rows.paired):
@@ -434,6 +441,9 @@ def _pushes(stops: Stops, speeds: Floats) -> Floats:
 
 
 _LEAST = 1e-12
+_FIRM = 1e9
+"""Of what is carried, in masses of the figure."""
+_UNIT = np.eye(3)
 _ENOUGH = 0.1
 """Of the slope at the start: where the lowest point is near enough."""
 _SEARCHES = 6

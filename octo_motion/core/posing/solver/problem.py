@@ -46,6 +46,11 @@ class Problem:
     rows: Rows
     blow: float
     """Change of speed, m/s, that is great enough to solve again for the slip after it."""
+    driven: Floats | None = None
+    """(bodies, 3) with what the springs' rests turn themselves, rad/s, world; None: they do not."""
+    carried: Floats | None = None
+    """(2 roots, 3) speeds u at which something else carries the roots: of all their shifts, then
+    of all their turns; None where they are free."""
 
     @property
     def spatial(self) -> Floats:

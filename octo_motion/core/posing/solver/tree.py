@@ -80,6 +80,8 @@ class Tree:
         self.shift_slot = np.flatnonzero(layout.shifts)
         """(roots,) slot of each root's shift."""
         self.shift_slot = self.shift_slot[np.argsort(layout.bodies[self.shift_slot])]
+        self.carried_slots = np.concatenate([self.shift_slot, self.joint_slot[self.roots]])
+        """(2 roots,) the roots' shifts, then their turns."""
         self.chain = np.where(filled, self.above[:, np.maximum(layout.bodies, 0)], 0.0)
         """(bodies, slots) 1 where the slot moves the body."""
         self.beyond = np.ascontiguousarray(self.chain.T)

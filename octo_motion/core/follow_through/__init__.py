@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Follow-through: bones that lag, swing and settle about what an action says."""
+
+from .chains import Chain, between, chains_of, find_loose
+from .limbs import Followed, Limbs, limbs_of, own_rotations
+from .sampling import BoneMotion, Displacement, displacement
+from .settings import MATERIALS, MEDIA, STARTS, FollowSettings
+from .simulation import STEPS, BodyCapsules, FollowJob, Simulation, follow
+
+__all__ = [
+    "MATERIALS",
+    "MEDIA",
+    "STARTS",
+    "STEPS",
+    "BodyCapsules",
+    "BoneMotion",
+    "Chain",
+    "Displacement",
+    "FollowJob",
+    "FollowSettings",
+    "Followed",
+    "Limbs",
+    "Simulation",
+    "between",
+    "chains_of",
+    "displacement",
+    "find_loose",
+    "follow",
+    "limbs_of",
+    "own_rotations",
+]
