@@ -25,7 +25,6 @@ from tests.bench import (
     apart,
     comparison,
     device_loop,
-    follow_through,
     live_speed,
     posing,
     splice_speed,
@@ -86,7 +85,6 @@ SECTIONS: Final[dict[str, Section]] = {
     "splices": Section(lambda options: splice_speed.measure(options.repeat), splice_speed.text),
     "live": Section(lambda _: live_speed.measure(), live_speed.text),
     "posing": Section(lambda _: posing.measure(), posing.text, posing.said),
-    "follow": Section(lambda _: follow_through.measure(), follow_through.text),
     "torn": Section(lambda _: posing.measure("--random", str(_TORN_STEPS)), posing.text_torn),
     "examples": Section(
         lambda _: _splicing().summary([_splicing().EXAMPLES], ["walk"]),
