@@ -6,7 +6,7 @@
 # The Blender with a window that takes pictures of itself; options may follow it.
 BLENDER ?= blender
 
-.PHONY: help test lint demo bench referee test-farm build release pictures diagram window experiment papers setups texts clean
+.PHONY: help test lint demo bench referee test-farm test-window build release pictures diagram window experiment papers setups texts clean
 
 help: ## list what can be made
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1|\2/p' Makefile | awk -F'|' '{printf "%-15s %s\n", $$1, $$2}'
@@ -28,6 +28,9 @@ referee: ## measure what Blender plays of set-ups, splices and drags, against th
 
 test-farm: ## try the job scripts for render farms in Open Job Description, Flamenco and Slurm
 	@.ci/dev test-farm $(ARGS)
+
+test-window: ## live the first hour in a window by mouse and keys: BLENDER=/path/to/blender
+	@BLENDER="$(BLENDER)" .ci/dev test-window $(ARGS)
 
 build: ## make the extension's zip in dist with Blender's own packer, and validate it
 	@.ci/dev build

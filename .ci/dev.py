@@ -289,6 +289,14 @@ def test_farm(arguments: Sequence[str]) -> None:
     run(venv("bpy-5.2", "bpy-4.5"), "-m", "tests.farm", *options, *arguments)
 
 
+def test_window(arguments: Sequence[str]) -> None:
+    """Live the first hour in a Blender with a window, by mouse and keys, against the zip."""
+    python, folder = venv("bpy-5.2", "bpy-4.5"), ROOT / "build" / "window-zip"
+    run(python, ".ci/build.py", folder)
+    (archive,) = folder.glob("*.zip")
+    run(python, "-m", "tests.window", archive, *arguments)
+
+
 def build(arguments: Sequence[str]) -> None:
     """Make the extension's zip in dist with Blender's own packer, and validate it."""
     run(venv("bpy-5.2", "bpy-4.5"), ".ci/build.py", *arguments)
@@ -392,6 +400,7 @@ TASKS: dict[str, Callable[[Sequence[str]], None]] = {
     "pictures": pictures,
     "diagram": diagram,
     "window": window,
+    "test-window": test_window,
     "experiment": experiment,
     "papers": papers,
     "setups": setups,

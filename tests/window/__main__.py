@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Install the zip into an empty user folder, and let a Blender with a window live the first hour.
+
+    python -m tests.window ARCHIVE [STEPS] [--folder build/window]
+
+BLENDER names the Blender, options may follow it. Where there is none, or no display, that is said
+and nothing is tried. Each step leaves pictures and a line in report.json.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+WINDOWS = platform.system() == "Windows"
+PATIENCE = 1800.0
+"""Seconds: drawn by software, each picture takes one or more."""
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run it; 0 where all steps went well, or where there is no window."""
+    parser = argparse.ArgumentParser(prog="make test-window", description=__doc__)
+    parser.add_argument("archive", type=Path, help="the extension's zip")
+    parser.add_argument("steps", nargs="*", help="of the first hour; all if none is named")
+    parser.add_argument("--folder", type=Path, default=Path("build/window"))
+    chosen = parser.parse_args(arguments)
+    words = shlex.split(os.environ.get("BLENDER") or "blender", posix=not WINDOWS)
+    if missing := no_window(words[0]):
+        print(f"Not tried in a window: {missing}")
+        return 0
+    folder = chosen.folder.resolve()
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / "user").mkdir(parents=True)
+    environment = {**os.environ, "BLENDER_USER_RESOURCES": str(folder / "user")}
+    install = ("extension", "install-file", "--repo", "user_default", "--enable")
+    subprocess.run(
+        [*words, "--background", "--command", *install, str(chosen.archive.resolve())],
+        env=environment,
+        check=True,
+    )
+    options = ("--enable-event-simulate", "--window-fullscreen")
+    with (folder / "said.txt").open("w", encoding="utf-8") as said:
+        ended = subprocess.run(
+            [*words, *options, "--python", str(HERE / "hour.py"), "--", str(folder), *chosen.steps],
+            env=environment,
+            stdout=said,
+            stderr=subprocess.STDOUT,
+            check=False,
+            timeout=PATIENCE,
+        )
+    return told(folder, ended.returncode)
+
+
+def no_window(blender: str) -> str:
+    """Why there is no Blender with a window, "" if there is."""
+    if shutil.which(blender) is None:
+        return f"there is no '{blender}'; name one, as in make test-window BLENDER=/path/to/blender"
+    own = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if platform.system() == "Linux" and not own and blender == "blender":
+        return "there is no display"
+    return ""
+
+
+def told(folder: Path, status: int) -> int:
+    """Say how it went; 0 if all went well."""
+    report = folder / "report.json"
+    if not report.exists():
+        print((folder / "said.txt").read_text(encoding="utf-8", errors="replace")[-4000:])
+        print(f"Blender ended with {status} before the first step was over.")
+        return 1
+    steps = json.loads(report.read_text(encoding="utf-8"))
+    for each in steps:
+        words = "; ".join(f"{name} {value}" for name, value in each["figures"].items())
+        print(f"{'ok  ' if each['ok'] else 'FAIL'} {each['step']}: {words or each['problem']}")
+        if not each["ok"] and words:
+            print(f"     {each['problem']}")
+    said = (folder / "said.txt").read_text(encoding="utf-8", errors="replace")
+    errors = [line for line in said.splitlines() if line.startswith(("Traceback", "Error: Python"))]
+    if errors:
+        print(f"Blender's console has {len(errors)} faults: {folder / 'said.txt'}")
+    print(f"Pictures: {folder}")
+    return int(bool(errors) or not steps[-1]["last"] or not all(each["ok"] for each in steps))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

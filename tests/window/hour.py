@@ -1,0 +1,443 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The first hour, step by step; Blender runs this, see ``__main__.py``.
+
+blender --enable-event-simulate --python tests/window/hour.py -- FOLDER [STEPS]
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from math import cos, pi, sin
+from pathlib import Path
+from typing import Any, Final
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import bpy
+from hand import PAUSE, Hand, HandError, Steps
+
+MODULE: Final = "bl_ext.user_default.octo_motion"
+Figures = dict[str, Any]
+
+
+def check(condition: object, what: str) -> None:
+    """Raise what is not so."""
+    if not condition:
+        raise HandError(what)
+
+
+def octopus() -> Any:
+    return next(
+        each for each in bpy.data.objects if each.type == "ARMATURE" and "Octo" in each.name
+    )
+
+
+def settings() -> Any:
+    return octopus().octo_motion.locomotion
+
+
+def action_of(item: Any) -> Any:
+    data = item.animation_data
+    return data.action if data is not None else None
+
+
+def select(item: Any) -> None:
+    """Make an object active alone, as a click on it does."""
+    for each in bpy.data.objects:
+        each.select_set(state=False)
+    item.select_set(state=True)
+    bpy.context.view_layer.objects.active = item
+
+
+# --- Steps ----------------------------------------------------------------------------------------
+
+
+def first_walk(hand: Hand, figures: Figures) -> Steps:
+    """From a new file to a walk: three clicks."""
+    for each in list(bpy.data.objects):
+        if each.type == "MESH":
+            bpy.data.objects.remove(each)
+    yield from hand.show_tab()
+    yield from hand.take("first_walk_0_tab")
+    begun, hand.clicks, seconds = time.perf_counter(), 0, 0.0
+    for number, (button, there) in enumerate(
+        (
+            ("octo_motion.add_octopus", lambda: bool(bpy.data.armatures)),
+            ("octo_motion.add_route", lambda: bool(bpy.data.curves)),
+            ("octo_motion.generate_locomotion", lambda: action_of(octopus()) is not None),
+        ),
+        1,
+    ):
+        yield from hand.find(button)
+        clicked = time.perf_counter()
+        yield from hand.click()
+        yield from hand.until(there, button)
+        yield from hand.settled()
+        seconds += time.perf_counter() - clicked
+        yield from hand.take(f"first_walk_{number}")
+    figures |= {
+        "clicks": hand.clicks,
+        "wheel ticks": hand.wheel,
+        "seconds of Blender": round(seconds, 1),
+        "with looking for buttons": round(time.perf_counter() - begun, 1),
+        "frames": action_of(octopus()).frame_range[1],
+    }
+    check(octopus().users_collection[0].name == "Octopus", "It has no collection of its own.")
+    yield from hand.over()
+    for _ in range(2):
+        yield from hand.key("Z", ctrl=True)
+    yield from hand.until(lambda: not bpy.data.curves, "Undo of the route")
+    for _ in range(2):
+        yield from hand.key("Z", ctrl=True, shift=True)
+    yield from hand.until(lambda: action_of(octopus()) is not None, "Redo of the walk")
+
+
+def live_drag(hand: Hand, figures: Figures) -> Steps:
+    """The end of the route is dragged over bumps, for 700 frames, and the creature follows."""
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=200, y_subdivisions=200, size=20.0)
+    ground: Any = bpy.context.object
+    for vertex in ground.data.vertices:
+        vertex.co.z = 0.08 * sin(3.0 * vertex.co.x) * cos(2.5 * vertex.co.y)
+    own = settings()
+    own.ground.object, own.timing, own.frame_end = ground, "RANGE", 700
+    select(octopus())
+    bpy.context.scene.frame_set(120)
+    own.live = True
+    yield from hand.until(lambda: action_of(octopus()).frame_range[1] == 700, "The live motion")
+    yield 2.0
+    route = own.route
+    select(route)
+    yield from hand.over()
+    before = [tuple(each.matrix.translation) for each in octopus().pose.bones]
+    latencies, shown, own_work = [], before, _timed_follow()
+    draws, begun = len(hand.draws), time.perf_counter()
+    yield from hand.key("G")
+    x, y = hand._place
+    drags = 20
+    for number in range(drags):
+        moved = time.perf_counter()
+        hand._place = (x + 4 * (number + 1), y + 2 * (number % 3))
+        hand.event("MOUSEMOVE", "NOTHING")
+        while time.perf_counter() - moved < 3.0:
+            yield 0.0
+            now = [tuple(each.matrix.translation) for each in octopus().pose.bones]
+            if now != shown and hand.draws[-1] > moved:
+                shown = now
+                latencies.append(hand.draws[-1] - moved)
+                break
+    lasted = time.perf_counter() - begun
+    yield from hand.take("live_drag_1_held")
+    hand.event("LEFTMOUSE", "PRESS")
+    hand.event("LEFTMOUSE", "RELEASE")
+    released, slices, last = time.perf_counter(), [], time.perf_counter()
+    written = (
+        action_of(octopus())["octo_motion"]["fingerprint"]
+        if "octo_motion" in action_of(octopus())
+        else None
+    )
+    while time.perf_counter() - released < 20.0:
+        yield 0.0
+        slices.append(time.perf_counter() - last)
+        last = time.perf_counter()
+        now = action_of(octopus()).get("octo_motion")
+        if now is not None and now["fingerprint"] != written:
+            break
+    check(latencies, "The creature did not follow the drag.")
+    latencies.sort()
+    own_work.sort()
+    figures |= {
+        "ms of processor a move": round(1e3 * own_work[len(own_work) // 2]),
+        "drags followed": f"{len(latencies)} of {drags}",
+        "ms to the redraw": round(1e3 * latencies[len(latencies) // 2]),
+        "slowest": round(1e3 * latencies[-1]),
+        "redraws a second": round((len(hand.draws) - draws) / lasted, 1),
+        "ms longest turn after": round(1e3 * max(slices)),
+    }
+    yield from hand.take("live_drag_2_let_go")
+    yield from hand.key("Z", ctrl=True)
+    yield 3.0
+    yield from hand.take("live_drag_3_undone")
+    settings().live = False
+
+
+def live_slider(hand: Hand, figures: Figures) -> Steps:
+    """A slider is dragged, and the creature follows while the button is held."""
+    own = settings()
+    select(octopus())
+    own.timing, own.live = "CADENCE", True
+    bpy.context.scene.frame_set(120)
+    yield 5.0
+    yield from hand.find("locomotion.cycle_time")
+    x, y = hand._place
+    hand.event("LEFTMOUSE", "PRESS")
+    yield PAUSE
+    poses, drags = set[Any](), 12
+    for number in range(drags):
+        yield from hand.move(x + 6 * (number + 1), y)
+        yield 0.5
+        poses.add(tuple(tuple(each.matrix.translation) for each in octopus().pose.bones))
+    yield from hand.take("live_slider_held")
+    hand.event("LEFTMOUSE", "RELEASE")
+    yield 3.0
+    figures |= {"poses while held": f"{len(poses)} of {drags}", "cycle": round(own.cycle_time, 2)}
+    check(len(poses) > 2, "The creature did not follow while the button was held.")
+    settings().live = False
+
+
+def splice(hand: Hand, figures: Figures) -> Steps:
+    """A part of another clip, its timing dragged in the viewport."""
+    new_file(hand)
+    yield 1.0
+    yield from hand.show_tab()
+    waver, walker = person("Waver", 1.5, wave=True), person("Walker", 0.0, wave=False)
+    select(waver)
+    walker.select_set(state=True)
+    bpy.context.view_layer.objects.active = walker
+    with bpy.context.temp_override(window=hand.window, area=hand.area(), region=hand.region()):
+        bpy.ops.view3d.view_selected()
+    yield from hand.settled()
+    yield from hand.search("Add Splice")
+    yield from hand.until(lambda: len(walker.octo_motion.splicing.splices) == 1, "The splice")
+    yield from hand.take("splice_1_added")
+    yield from hand.search("Drag Timing of Splice")
+    yield 1.0
+    x, y = hand._place
+    for number in range(20):
+        yield from hand.move(x + 15 * (number + 1), y)
+    yield from hand.take("splice_2_dragged")
+    yield from hand.click()
+    stack = walker.octo_motion.splicing
+    yield from hand.until(lambda: stack.result is not None, "The spliced action")
+    figures["begins at"] = stack.splices[0].base_start
+    check(stack.splices[0].base_start > 1.0, "The drag did not move its start.")
+    yield from hand.take("splice_3_built")
+    yield from hand.key("Z", ctrl=True)
+    yield from hand.until(
+        lambda: bpy.data.objects["Walker"].octo_motion.splicing.result is None, "Undo"
+    )
+
+
+def pose(hand: Hand, figures: Figures) -> Steps:
+    """An arm is pinned, pulled, keyed; undo; and Blender asks before it quits over the key."""
+    new_file(hand)
+    yield 1.0
+    yield from hand.show_tab()
+    yield from hand.search("Octopus")
+    if not bpy.data.armatures:
+        bpy.ops.octo_motion.add_octopus("INVOKE_DEFAULT")
+    creature = octopus()
+    select(creature)
+    yield from hand.settled()
+    yield from hand.search("Pose by Hand")
+    yield 2.0
+    check(_modal("OCTO_MOTION_OT_pose"), "The session has not begun.")
+    tip = creature.pose.bones["arm2.08.L"]
+    start = hand.pixel(creature.matrix_world @ tip.head)
+    yield from hand.move(*start)
+    hand.event("LEFTMOUSE", "PRESS")
+    yield PAUSE
+    for number in range(25):
+        yield from hand.move(start[0] + 2 * number, start[1] + 6 * number)
+    yield from hand.take("pose_1_pulled")
+    hand.event("LEFTMOUSE", "RELEASE")
+    yield 0.3
+    yield from hand.key("P")
+    yield from hand.key("K")
+    yield 0.5
+    figures["keys"] = sum(len(curve.keyframe_points) for curve in curves(action_of(creature)))
+    check(figures["keys"], "K has set no key.")
+    yield from hand.take("pose_2_keyed")
+    yield from hand.key("Z", ctrl=True)
+    yield 0.5
+    yield from hand.take("pose_3_undone")
+    yield from hand.key("K")
+    yield 0.5
+    yield from hand.key("RET")
+    yield 1.0
+    check(not _modal("OCTO_MOTION_OT_pose"), "Enter has not ended the session.")
+    check(bpy.data.is_dirty, "Blender does not know of the keys: it would quit without asking.")
+    yield from hand.over()
+    yield from hand.key("Q", ctrl=True)
+    yield 1.0
+    yield from hand.take("pose_4_quit")
+    yield from hand.key("ESC")
+    yield 0.5
+
+
+def switched_off(hand: Hand, figures: Figures) -> Steps:
+    """The add-on is disabled in the middle of a session, and enabled again."""
+    if not bpy.data.armatures:
+        bpy.ops.octo_motion.add_octopus("INVOKE_DEFAULT")
+    select(octopus())
+    yield from hand.search("Pose by Hand")
+    yield 2.0
+    check(_modal("OCTO_MOTION_OT_pose"), "The session has not begun.")
+    bpy.ops.preferences.addon_disable(module=MODULE)
+    yield 1.0
+    yield from hand.take("switched_off_1")
+    check(not hasattr(bpy.types.Object, "octo_motion"), "Settings are left.")
+    check("octo_motion" not in dir(bpy.ops) or not dir(bpy.ops.octo_motion), "Operators are left.")
+    yield from hand.over()
+    yield from hand.key("HOME")
+    bpy.ops.preferences.addon_enable(module=MODULE)
+    yield 1.0
+    yield from hand.show_tab()
+    check(hasattr(bpy.types.Object, "octo_motion"), "It does not come back.")
+    yield from hand.take("switched_off_2_again")
+    figures["left behind"] = "nothing"
+
+
+STEPS: Final[dict[str, Callable[[Hand, Figures], Steps]]] = {
+    "first_walk": first_walk,
+    "live_drag": live_drag,
+    "live_slider": live_slider,
+    "splice": splice,
+    "pose": pose,
+    "switched_off": switched_off,
+}
+
+
+# --- What they need -------------------------------------------------------------------------------
+
+
+def _timed_follow() -> list[float]:
+    """Seconds of the processor that the extension takes for each change from now on: what Blender
+    draws by software, and other programs, are not in them.
+    """
+    live: Any = sys.modules[f"{MODULE}.ui.locomotion.operators.generate"]
+    follow, taken = live._follow, []
+
+    def timed(*arguments: Any, **more: Any) -> None:
+        begun = time.thread_time()
+        follow(*arguments, **more)
+        taken.append(time.thread_time() - begun)
+
+    live._follow = timed
+    return taken
+
+
+def _modal(name: str) -> bool:
+    return any(
+        each is not None and each.bl_idname.startswith(name)
+        for window in bpy.context.window_manager.windows
+        for each in window.modal_operators
+    )
+
+
+def curves(action: Any) -> list[Any]:
+    if action is None:
+        return []
+    bags = [bag for layer in action.layers for strip in layer.strips for bag in strip.channelbags]
+    return [curve for bag in bags for curve in bag.fcurves]
+
+
+def new_file(hand: Hand) -> None:
+    """An empty scene, without a question."""
+    for each in list(bpy.data.objects):
+        bpy.data.objects.remove(each)
+    data: Any = bpy.data
+    for kind in (data.armatures, data.curves, data.actions, data.meshes):
+        for each in list(kind):
+            kind.remove(each)
+    bpy.context.scene.frame_set(1)
+    hand.redraw()
+
+
+_BONES: Final = {
+    "Hips": ("", (0.0, 0.0, 1.0), (0.0, 0.0, 1.1)),
+    "Spine": ("Hips", (0.0, 0.0, 1.1), (0.0, 0.0, 1.35)),
+    "Chest": ("Spine", (0.0, 0.0, 1.35), (0.0, 0.0, 1.5)),
+    "Neck": ("Chest", (0.0, 0.0, 1.5), (0.0, 0.0, 1.6)),
+    "Head": ("Neck", (0.0, 0.0, 1.6), (0.0, 0.0, 1.8)),
+    "{}Shoulder": ("Chest", (0.03, 0.0, 1.48), (0.15, 0.0, 1.48)),
+    "{}Arm": ("{}Shoulder", (0.15, 0.0, 1.48), (0.45, 0.0, 1.48)),
+    "{}ForeArm": ("{}Arm", (0.45, 0.0, 1.48), (0.7, 0.0, 1.48)),
+    "{}Hand": ("{}ForeArm", (0.7, 0.0, 1.48), (0.85, 0.0, 1.48)),
+    "{}UpLeg": ("Hips", (0.1, 0.0, 1.0), (0.1, -0.01, 0.55)),
+    "{}Leg": ("{}UpLeg", (0.1, -0.01, 0.55), (0.1, 0.02, 0.1)),
+    "{}Foot": ("{}Leg", (0.1, 0.02, 0.1), (0.1, -0.15, 0.02)),
+}
+
+
+def person(name: str, aside: float, *, wave: bool) -> Any:
+    """Somebody who walks on the spot, or waves."""
+    armature: Any = bpy.data.objects.new(name, bpy.data.armatures.new(name))
+    bpy.context.scene.collection.objects.link(armature)
+    armature.location.x = aside
+    select(armature)
+    bpy.ops.object.mode_set(mode="EDIT")
+    for pattern, (above, head, tail) in _BONES.items():
+        for side, sign in (("Left", 1.0), ("Right", -1.0)) if "{}" in pattern else (("", 1.0),):
+            bone = armature.data.edit_bones.new(pattern.format(side))
+            bone.head, bone.tail = ((sign * x, y, z) for x, y, z in (head, tail))
+            if above:
+                bone.parent = armature.data.edit_bones[above.format(side)]
+    bpy.ops.object.mode_set(mode="POSE")
+    for bone in armature.pose.bones:
+        bone.rotation_mode = "XYZ"
+    for frame in range(1, 121, 5):
+        phase = 2.0 * pi * (frame - 1) / 40.0
+        for side, sign in (("Left", 1.0), ("Right", -1.0)):
+            turns = {"UpLeg": 0.5 * sign * sin(phase), "Leg": 0.4 + 0.3 * sign * cos(phase)}
+            turns["Arm"] = -0.9 + (0.7 * sin(2.0 * phase) + 1.2 if wave else 0.2 * sin(phase))
+            for part, angle in turns.items():
+                bone = armature.pose.bones[f"{side}{part}"]
+                bone.rotation_euler.x = angle
+                bone.keyframe_insert("rotation_euler", frame=frame)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    armature.animation_data.action.name = f"{name} Clip"
+    return armature
+
+
+def main(folder: Path, names: list[str]) -> None:
+    """Begin; Blender ends when all is over."""
+    view: Any = bpy.context.preferences.view
+    view.show_splash, view.smooth_view = False, 0
+    hand = Hand(folder)
+    report: list[Figures] = []
+
+    def all_steps() -> Steps:
+        chosen = names or list(STEPS)
+        for name in chosen:
+            figures: Figures = {}
+            problem = ""
+            try:
+                yield from STEPS[name](hand, figures)
+            except Exception as error:  # noqa: BLE001 - the next step is to be tried all the same
+                problem = str(error) if isinstance(error, HandError) else traceback.format_exc()
+                hand.event("ESC", "PRESS")
+                hand.event("ESC", "RELEASE")
+                yield 1.0
+                yield from hand.take(f"{name}_failed")
+            report.append(
+                {
+                    "step": name,
+                    "ok": not problem,
+                    "problem": problem,
+                    "figures": figures,
+                    "last": name == chosen[-1],
+                }
+            )
+            (folder / "report.json").write_text(json.dumps(report, indent=2), encoding="utf-8")
+
+    steps = all_steps()
+
+    def play() -> float:
+        try:
+            return next(steps)
+        except StopIteration:
+            sys.stdout.flush()
+            # Not by its own way out: that would ask about what is not saved.
+            os._exit(0)
+
+    bpy.app.timers.register(play, first_interval=2.0, persistent=True)
+
+
+if __name__ == "__main__":
+    begins = sys.argv.index("--") + 1
+    main(Path(sys.argv[begins]), sys.argv[begins + 1 :])
