@@ -46,13 +46,16 @@ def fetch_wheel(name: str) -> Path:
 
 
 def lay_out(folder: Path, wheels: list[str]) -> None:
-    """Put the files side by side as they will be in the zip: manifest, licence, code, wheels."""
+    """Put the files side by side as they will be in the zip: manifest, licence, code, manual,
+    wheels.
+    """
     shutil.copytree(
         REPOSITORY / "octo_motion", folder, ignore=shutil.ignore_patterns("__pycache__")
     )
     shutil.copy(REPOSITORY / "blender_manifest.toml", folder)
     shutil.copy(REPOSITORY / "LICENSE", folder)
     shutil.copy(REPOSITORY / "THIRD_PARTY.md", folder)
+    run(sys.executable, REPOSITORY / ".ci" / "manual.py", folder / "manual")
     (folder / "wheels").mkdir()
     for wheel in wheels:
         shutil.copy(fetch_wheel(wheel), folder / "wheels")

@@ -136,9 +136,21 @@ def blender_said(error: RuntimeError) -> str:
     return reason.removeprefix("Error: ").rstrip(".") + "."
 
 
-# --- The creature and its motion for other programs: glTF, FBX, Alembic ---------------------------
+# --- The creature and its motion for other programs: glTF, FBX, Alembic, USD ----------------------
 
 
+_USD: Final = (
+    "wm",
+    "usd_export",
+    {
+        "selected_objects_only": True,
+        "export_animation": True,
+        "export_armatures": True,
+        "export_lights": False,
+        "export_cameras": False,
+        "convert_world_material": False,
+    },
+)
 _EXPORTERS: Final[Mapping[str, tuple[str, str, Mapping[str, Any]]]] = {
     ".glb": (
         "export_scene",
@@ -163,6 +175,7 @@ _EXPORTERS: Final[Mapping[str, tuple[str, str, Mapping[str, Any]]]] = {
         },
     ),
     ".abc": ("wm", "alembic_export", {"selected": True, "as_background_job": False}),
+    **dict.fromkeys((".usd", ".usdc", ".usda"), _USD),
 }
 """The operator of each format, by its group and name, and its options."""
 

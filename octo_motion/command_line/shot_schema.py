@@ -148,7 +148,7 @@ def frame_rate(fps: float) -> tuple[int, float]:
 # --- Keys -----------------------------------------------------------------------------------------
 
 
-_EXPORT_SUFFIXES: Final = (".glb", ".fbx", ".abc")
+_EXPORT_SUFFIXES: Final = (".glb", ".fbx", ".abc", ".usd", ".usdc", ".usda")
 _MOST_FRAMES: Final = 1_000_000
 """A little below Blender's last frame."""
 

@@ -13,6 +13,7 @@ import bpy
 from ..blender.rig import active_armature
 from ..core.errors import RigError
 from .language import OWN, translated
+from .manual import draw_manual_button
 from .tool import tool_of
 
 _CHARACTER: Final = 6.5
@@ -99,6 +100,10 @@ class TabPanel:
     bl_region_type = "UI"
     bl_category = "Octo Motion"
     bl_translation_context = OWN
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:  # noqa: ARG002
+        """Blender's place at the right of a panel's header."""
+        draw_manual_button(cast("Any", self).layout, type(self))
 
 
 class ArmaturePanel(TabPanel):

@@ -9,7 +9,17 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from . import at_work, findable, follow_through, language, locomotion, posing, splicing
+from . import (
+    at_work,
+    findable,
+    follow_through,
+    language,
+    locomotion,
+    manual,
+    posing,
+    preferences,
+    splicing,
+)
 from .declared_settings import PointerProperty, make_overridable
 from .follow_through import OCTO_MOTION_PG_follow_through
 from .locomotion import OCTO_MOTION_PG_contact, OCTO_MOTION_PG_locomotion, keep_look, stamp
@@ -105,6 +115,8 @@ MENUS: tuple[tuple[str, Draw], ...] = (
 )
 
 CLASSES: tuple[type, ...] = (
+    manual.OCTO_MOTION_OT_manual,
+    preferences.OCTO_MOTION_AP_preferences,
     *locomotion.CLASSES,
     *splicing.SETTINGS,
     *splicing.CLASSES,
@@ -125,6 +137,8 @@ def _steps() -> list[Step]:
         *(menu_entry(menu, draw) for menu, draw in MENUS),
         *posing.STEPS,
         *splicing.STEPS,
+        *manual.STEPS,
+        Step(preferences.hand_on_devices, nothing),
         Step(nothing, at_work.stop_all),
     ]
 

@@ -243,7 +243,10 @@ def test_a_shot_on_the_spot_needs_no_route(tmp_path: Path) -> None:
         (WALK.replace("reef.blend", ""), "file must be a text, not ''."),
         (WALK.replace("out/walk.blend", "reef.blend"), "is an input of shot 'walk'"),
         (WALK.replace("out/walk.blend", "./out/../reef.blend"), "is an input of shot 'walk'"),
-        (WALK + 'export = "job.toml"\n', "is no format to export to. Valid: .glb, .fbx, .abc."),
+        (
+            WALK + 'export = "job.toml"\n',
+            "is no format to export to. Valid: .glb, .fbx, .abc, .usd, .usdc, .usda.",
+        ),
         (WALK + 'export = "a.gltf"\n', "export to .glb, the same in one."),
         (WALK + "export = 3\n", "export must be a path or a list of paths, not 3."),
         (WALK + 'export = ["a.glb", "a.glb"]\n', "is an output of shot 'walk' too"),

@@ -601,7 +601,7 @@ def test_of_several_armatures_the_one_with_arms_is_meant(
 
 # Blender 5.2's exporter does what a later numpy will refuse.
 @pytest.mark.filterwarnings("ignore:Setting the shape on a NumPy array:DeprecationWarning")
-@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".abc"])
+@pytest.mark.parametrize("suffix", [".glb", ".fbx", ".abc", ".usd"])
 def test_export_has_the_creature_and_its_motion_alone(
     scene: Path, tmp_path: Path, suffix: str
 ) -> None:
@@ -617,6 +617,8 @@ def test_export_has_the_creature_and_its_motion_alone(
         bpy.ops.import_scene.gltf(filepath=str(path))
     elif suffix == ".fbx":
         bpy.ops.import_scene.fbx(filepath=str(path))
+    elif suffix == ".usd":
+        bpy.ops.wm.usd_import(filepath=str(path))
     else:
         bpy.ops.wm.alembic_import(filepath=str(path), as_background_job=False)
     types = [each.type for each in bpy.data.objects if not each.name.startswith("Icosphere")]

@@ -32,6 +32,7 @@ from .clips import (
 )
 from .fcurves import lasting
 from .object_keys import ObjectKeys
+from .pose_assets import make_pose_asset
 from .pose_keys import Keyed, PoseKeys, mark_file_changed
 from .poses import (
     SCALE,
@@ -84,6 +85,7 @@ __all__ = [
     "lasting",
     "lay_edits",
     "layers_off",
+    "make_pose_asset",
     "mark_file_changed",
     "may_replace",
     "note_of",

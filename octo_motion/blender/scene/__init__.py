@@ -18,7 +18,7 @@ from .grasp_target import (
 )
 from .imports import NOTE, ImportedClip, Up, import_clip, remove_clips
 from .loose_objects import LooseObject
-from .octopus import add_octopus
+from .octopus import add_octopus, own_collection
 from .surfaces import is_enabled, read_obstacle, read_triangles
 
 __all__ = [
@@ -40,6 +40,7 @@ __all__ = [
     "is_carried",
     "is_enabled",
     "markers",
+    "own_collection",
     "part_of_pose",
     "place_clip",
     "put_back",

@@ -18,6 +18,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core.rotations import Floats
+from .octopus import own_collection
 
 _SIZE: Final = 0.07
 """Arm lengths."""
@@ -165,5 +166,7 @@ def _collection(armature: bpy.types.Object) -> bpy.types.Collection:
     scene = bpy.context.scene
     assert scene is not None
     if collection not in scene.collection.children_recursive:
-        scene.collection.children.link(collection)
+        own = own_collection(armature)
+        inside = own is not None and own in scene.collection.children_recursive
+        (own if own is not None and inside else scene.collection).children.link(collection)
     return collection

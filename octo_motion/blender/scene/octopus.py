@@ -26,6 +26,8 @@ from ...core.locomotion.octopus import (
 from ..rig import ALIGNED, SUCKER_PROPERTY
 
 _NAME: Final = "Octopus"
+OWN_COLLECTION: Final = "octo_motion_creature"
+"""Custom property of a collection that was made for a creature and what belongs to it."""
 _Colour = tuple[float, float, float]
 
 _MATERIALS: Final[dict[SkinMaterial, tuple[str, _Colour, float]]] = {
@@ -44,17 +46,24 @@ _BODY_HUE: Final = 0.36
 
 
 def add_octopus(
-    context: bpy.types.Context, shape: OctopusShape, matrix: Matrix, *, with_skin: bool = True
+    context: bpy.types.Context,
+    shape: OctopusShape,
+    matrix: Matrix,
+    *,
+    with_skin: bool = True,
+    apart: bool = False,
 ) -> bpy.types.Object:
     """A new armature object in object mode, active and alone selected, with its skin as a child.
 
-    The objects go where the view layer puts new ones, the armature's origin by a matrix of the
-    world.
+    The objects go where the view layer puts new ones, or apart, into a new collection there, which
+    takes the creature's route and markers too. The armature's origin goes by a matrix of the world.
 
     Raises:
         WriteError: the scene is linked from another file.
     """
     collection = _destination(context)
+    if apart:
+        collection = _own_collection(collection)
     bones = build_bones(shape)
     skin = build_mesh(shape) if with_skin else None
     for each in context.selected_objects:
@@ -72,6 +81,21 @@ def _destination(context: bpy.types.Context) -> bpy.types.Collection:
             if collection is not None and collection.is_editable:
                 return collection
     raise WriteError("The scene is linked from another file.", "Work in a scene of this file.")
+
+
+def _own_collection(parent: bpy.types.Collection) -> bpy.types.Collection:
+    made = bpy.data.collections.new(_NAME)
+    made[OWN_COLLECTION] = True
+    parent.children.link(made)
+    return made
+
+
+def own_collection(creature: bpy.types.Object) -> bpy.types.Collection | None:
+    """The collection that was made for a creature and what belongs to it; none without."""
+    return next(
+        (each for each in creature.users_collection if OWN_COLLECTION in each and each.is_editable),
+        None,
+    )
 
 
 def _new_armature(

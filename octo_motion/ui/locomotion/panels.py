@@ -209,8 +209,9 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
     bl_order = 1
     tool = "MOVE"
 
-    def draw_header_preset(self, context: bpy.types.Context) -> None:  # noqa: ARG002
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
         OCTO_MOTION_PT_setups.draw_panel_header(cast("Any", self).layout)
+        super().draw_header_preset(context)
 
     def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         draw_setups(layout)

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, StringProperty
 
-from ...blender.animation import writable_armature
+from ...blender.animation import make_pose_asset, writable_armature
 from ...blender.rig import (
     Puppet,
     active_armature,
@@ -29,6 +29,36 @@ from .measuring_hand import BEARS, check_joint, coefficients, measured_joint
 from .properties import MOVES, OBSTACLES, STANDS, posing_settings
 from .puppet_session import PuppetSession, active_session
 from .session_settings import joints_of_now, keep_material
+
+
+class OCTO_MOTION_OT_pose_asset(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.pose_asset"
+    bl_label = "Pose as Asset"
+    bl_description = (
+        "Put the pose that the armature has now into Blender's pose library, of this file: all of "
+        "it, or the selected bones of pose mode. From there it can be applied, blended and mirrored"
+    )
+
+    name: StringProperty(
+        name="Name",
+        description="Of the asset; the armature's and the frame if empty",
+        options={"SKIP_SAVE"},
+    )
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        pose = armature.pose
+        names = selected_bones(armature) if armature.mode == "POSE" else []
+        names = names or [each.name for each in (pose.bones if pose is not None else ())]
+        frame = context.scene.frame_current
+        made = make_pose_asset(armature, names, self.name or f"{armature.name} {frame}")
+        if not bpy.app.background:
+            # A picture of it, which Blender draws in its own time.
+            made.asset_generate_preview()
+        told = phrase(
+            "'{name}' is in the pose library: {count} bones.", name=made.name, count=len(names)
+        )
+        self.report({"INFO"}, reported(told))
 
 
 class OCTO_MOTION_OT_pose_mark_bones(ArmatureOperator, bpy.types.Operator):

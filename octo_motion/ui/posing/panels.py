@@ -25,6 +25,7 @@ from .device_pose import (
 )
 from .device_settings import device_settings, key_file
 from .operators import (
+    OCTO_MOTION_OT_pose_asset,
     OCTO_MOTION_OT_pose_coefficients,
     OCTO_MOTION_OT_pose_forget_measured,
     OCTO_MOTION_OT_pose_loose,
@@ -150,6 +151,7 @@ class OCTO_MOTION_PT_posing_keys(PosePanel, bpy.types.Panel):
         layout.prop(settings, "key_blend")
         layout.prop(settings, "record_angle")
         layout.operator_context = "INVOKE_DEFAULT"
+        layout.operator(OCTO_MOTION_OT_pose_asset.bl_idname, icon="ASSET_MANAGER")
         layout.operator(OCTO_MOTION_OT_pose_script.bl_idname, icon="FILE_SCRIPT")
 
 

@@ -25,6 +25,7 @@ from ..operator_base import (
     window_manager,
 )
 from ..panel_base import ItemRows
+from ..preferences import begin_as_preferred
 from .properties import PARTS, splicing_settings
 from .stack import (
     ClipReader,
@@ -187,8 +188,10 @@ class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
         clip = reader.source(source, action, slot, visual=False).clip
         if settings.base is None:
             settings.base, settings.base_slot = base, base_slot
+            begin_as_preferred(settings, {"result_as": "layer"})
         item = add_splice(settings, source, action, float(begins), clip.frames)
         item.part, item.bone, item.slot = self.part, bone, slot
+        begin_as_preferred(item, {"fade_unit": "fade_unit"})
         name_splice(settings, item)
         settings.active_splice = len(settings.splices) - 1
 

@@ -18,11 +18,13 @@ from ...blender.animation import pose_values, restore_pose, show_pose, writable_
 from ...blender.rig import active_armature
 from ...core.errors import ClipError, OctoMotionError, WriteError
 from ...core.phrases import phrase
+from ...core.splicing.clip import Timing
 from .. import at_work
 from ..language import reported, translated
 from .properties import splicing_settings
 from .splice_operators import SpliceOperator, active_splice, build_retimed, report_built
 from .stack import ListedSpliceError, Stack, local_object, prepare_splices
+from .timing_strip import Strip, StripOverlay, strip_of
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import OperatorReturnItems
@@ -124,6 +126,27 @@ class DragSession:
         # A change of frame poses the armature as its action says.
         bpy.app.handlers.frame_change_post.append(self._follow)
 
+    @property
+    def timing(self) -> Timing:
+        """As it is dragged now."""
+        base_start, splice_start = self.drag.starts
+        return replace(self._timing, base_start=base_start, splice_start=splice_start)
+
+    def strip(self) -> Strip | None:
+        """Where on its base the splice acts now; none where the timing makes no sense."""
+        splice = self.stack.splices[self.number]
+        if self._down or splice is None:
+            return None
+        with suppress(OctoMotionError):
+            return strip_of(self.timing, self.stack.base.clip, splice.clip)
+        return None
+
+    def header(self) -> str:
+        """The numbers, and what there is to say of them."""
+        strip = self.strip()
+        warning = strip.warning if strip is not None else ""
+        return self.drag.header() + (f"    {translated(warning)}" if warning else "")
+
     def show(self) -> None:
         """Pose the armature as the result is at the current frame.
 
@@ -134,10 +157,8 @@ class DragSession:
         if self._down or scene is None:
             return
         armature = local_object(self.stack.armature)
-        base_start, splice_start = self.drag.starts
-        timing = replace(self._timing, base_start=base_start, splice_start=splice_start)
         with self.stack.naming():
-            clip = self._live.at(scene.frame_current_final, timing)
+            clip = self._live.at(scene.frame_current_final, self.timing)
         scales = None if clip.scales is None else clip.scales[0]
         show_pose(armature, clip.skeleton.names, clip.rotations[0], clip.locations[0], scales)
 
@@ -214,6 +235,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
     )
 
     _session: DragSession | None = None
+    _overlay: StripOverlay | None = None
     _mouse: float = 0.0
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
@@ -243,9 +265,10 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         except OctoMotionError as error:
             return self._fail(context, error)
         self._mouse = event.mouse_x
+        self._overlay = StripOverlay(self._session.strip, stack.names[settings.active_splice])
         window_manager.modal_handler_add(self)
         at_work.begun(self, self._tear_down)
-        _write(context, self._session.drag.header(), _HELP)
+        _write(context, self._session.header(), _HELP)
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[OperatorReturnItems]:
@@ -267,7 +290,9 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         except BaseException:
             self._tear_down(context)
             raise
-        _write(context, session.drag.header(), _HELP)
+        _write(context, session.header(), _HELP)
+        if self._overlay is not None:
+            self._overlay.redraw()
         return {"PASS_THROUGH"} if free else {"RUNNING_MODAL"}
 
     def cancel(self, context: bpy.types.Context) -> None:
@@ -292,12 +317,15 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         session = self._session
         assert session is not None
         starts, stack, number = session.drag.starts, session.stack, session.number
+        strip = session.strip()
         self._tear_down(context)
         armature = local_object(stack.armature)
         settings = splicing_settings(armature)
         # For the panel of the last operation.
         self.base_start, self.splice_start = starts
         report_built(self, build_retimed(armature, settings, number, starts, stack))
+        if strip is not None and strip.warning:
+            self.report({"WARNING"}, reported(strip.warning))
         return {"FINISHED"}
 
     def _fail(self, context: bpy.types.Context, error: OctoMotionError) -> set[OperatorReturnItems]:
@@ -310,6 +338,9 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
     def _tear_down(self, context: bpy.types.Context) -> None:
         """Leave nothing on screen and armature; safe to call twice."""
         at_work.done(self)
+        if self._overlay is not None:
+            self._overlay.take_down()
+            self._overlay = None
         if self._session is None:
             return
         self._session.tear_down()

@@ -264,3 +264,31 @@ def test_it_works_with_nothing_active_and_with_preferences_that_enter_edit_mode(
     bpy.context.preferences.edit.use_enter_edit_mode = True
     add_octopus()
     assert bpy.context.mode == "OBJECT"
+
+
+def test_what_is_clicked_has_a_collection_of_its_own_with_route_and_markers() -> None:
+    clicked = add_octopus(ready=True, size=1.0)
+    (own,) = clicked.users_collection
+    assert own.name == "Octopus"
+    assert own.name in bpy.context.scene.collection.children
+    assert all(own in each.users_collection for each in clicked.children)
+    bpy.ops.octo_motion.add_route()
+    assert clicked.octo_motion.locomotion.route.users_collection == (own,)
+    clicked.octo_motion.locomotion.timing = "RANGE"
+    clicked.octo_motion.locomotion.frame_end = 20
+    bpy.ops.octo_motion.contacts_show()
+    assert [each.name for each in own.children] == ["Octopus Contacts"]
+
+
+@pytest.mark.parametrize("size", [0.5, 1.0, 2.0])
+def test_all_of_it_grows_with_its_size(size: float) -> None:
+    plain = add_octopus()
+    sized = add_octopus(size=size)
+    share = size / OctopusShape().arm_length
+    ends = [
+        np.array([[*bone.head_local, *bone.tail_local] for bone in each.data.bones])
+        for each in (plain, sized)
+    ]
+    np.testing.assert_allclose(ends[1], share * ends[0], atol=1e-5)
+    heights = [np.ptp([v.co.z for v in each.children[0].data.vertices]) for each in (plain, sized)]
+    assert heights[1] == pytest.approx(share * heights[0], rel=1e-4)

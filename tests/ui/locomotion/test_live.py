@@ -395,6 +395,24 @@ def test_the_frame_in_sight_is_there_before_all_others(octopus: Any, frame: int)
     assert frame == 1 or far > 100.0 * off
 
 
+def test_the_way_and_its_footholds_are_drawn_until_the_motion_is_there(octopus: Any) -> None:
+    settings_of(octopus).ground.object = make_square(20.0)
+    settle()
+    assert not live._state.following
+    drag_route(octopus)
+    bpy.context.view_layer.update()
+    live.run_pending()
+    (work,) = live._state.following.values()
+    (path, _, _), (marks, _, _) = work.lines
+    end = settings_of(octopus).route
+    place = end.matrix_world @ end.data.splines[0].bezier_points[-1].co
+    assert np.hypot(*(path[-1] - place)[:2]) < 0.01
+    assert len(marks) > 16
+    np.testing.assert_allclose(marks[:, 2], 0.0, atol=0.05)
+    live.finish_following()
+    assert not live._state.following
+
+
 def test_another_frame_is_shown_as_it_is_going_to_be(octopus: Any) -> None:
     settings_of(octopus).frame_end = 160
     drag_route(octopus)

@@ -21,6 +21,7 @@ from octo_motion.core.splicing.humanoid.landmarks import LANDMARKS
 from octo_motion.ui.splicing import splice_panels
 from octo_motion.ui.splicing.stack import prepare_splices
 from octo_motion.ui.splicing.timing_drag import (
+    PER_PIXEL,
     DragSession,
     OCTO_MOTION_OT_splice_drag_timing,
     TimingDrag,
@@ -737,6 +738,24 @@ def test_a_typed_frame_counts_until_it_is_taken_back() -> None:
     assert drag.starts == (10.0, 3.0)
     drag.type("-")
     assert drag.starts == (10.0, 3.0)
+
+
+def test_a_splice_that_is_dragged_off_its_base_says_so() -> None:
+    hero, _ = hero_and_source()
+    OPERATORS.splice_add()
+    first, last = hero.animation_data.action.frame_range
+    session = DragSession(prepare_splices(hero), 0, bpy.context.scene)
+    assert "base (" not in session.header()
+    strip = session.strip()
+    assert strip is not None
+    assert strip.start == session.drag.starts[0]
+    frames, acting = strip.outline().T
+    assert (np.diff(frames) >= 0.0).all()
+    assert acting.tolist() == [0.0, 1.0, 1.0, 0.0]
+    session.drag.tick((last - first + 100.0) / PER_PIXEL)
+    assert f"The splice lies after its base (frames {first:g} to {last:g})" in session.header()
+    session.tear_down()
+    assert session.strip() is None
 
 
 def test_mouse_and_keys_do_what_the_status_bar_says() -> None:

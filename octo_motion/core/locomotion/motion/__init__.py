@@ -15,7 +15,7 @@ from .job import (
     Timing,
     Tolerances,
 )
-from .pipeline import MISS, Glimpsed, MotionResult, compute, glimpse, pose
+from .pipeline import MISS, Glimpsed, MotionResult, compute, glimpse, pose, way_of
 from .planning import (
     GaitTargets,
     MotionPlan,
@@ -50,4 +50,5 @@ __all__ = [
     "pose",
     "schedule",
     "shown_contacts",
+    "way_of",
 ]

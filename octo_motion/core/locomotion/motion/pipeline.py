@@ -85,6 +85,8 @@ _BONES_AT_ONCE: Final = 24_000
 """Bones times frames of one step of the work: some tens of megabytes."""
 _HELPED: Final = 0.85
 """Share of the largest turn that is left, at most, where bones were given time."""
+_TURNS: Final = 4
+"""Of one step where Blender goes on meanwhile; the numbers are the same."""
 _FLOOR_AROUND: Final = 2.5
 """Arm lengths to all sides of the body in which the floor is looked at …"""
 _FLOOR_FINE: Final = 0.02
@@ -101,6 +103,8 @@ _UNSCALED: Final = 1e-5
 _AROUND_CYCLES: Final = 0.15
 """Cycles to either side of a frame that a glimpse of it is worked out from, and as moments at least
 and at most. Swings are evened out and arms make way for each other within that."""
+_WAY: Final = 97
+"""Places of the body that show its way."""
 _AROUND_MOMENTS: Final = (8, 16)
 
 _Outcome = TypeVar("_Outcome")
@@ -129,9 +133,11 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     moments, times = _moments(plan)
     reducing, every = plan.tolerances is not None or plan.subframe_sampled, plan.stride
     moving = _MOVING if reducing else 1.0
-    step = max(1, _BONES_AT_ONCE // max(len(plan.first.poser.bones), 1))
+    at_once = _BONES_AT_ONCE // (_TURNS if plan.job.live else 1)
+    step = max(1, at_once // max(len(plan.first.poser.bones), 1))
     posing = _posed(plan, times, step, cyclic=plan.job.in_place)
     posed = yield from _scaled(posing, 0.0, moving)
+    yield moving
     arms, going, keyed, reached = posed.arms, posed.going, posed.keyed, posed.reached
     warnings = [*plan.warnings, *posed.warnings]
     organs = _organs(plan, moments, keyed, posed.swimming)
@@ -204,9 +210,13 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     keyed = _stays(plan, going, offset) if job.in_place else going
     frames_per_metre = every * plan.pace.mean / plan.schedule.travel.stride
     made = yield from segments.compute(travel, places, step, frames_per_metre, cyclic=cyclic)
+    # Each of these takes a while; who works in turns looks about in between.
+    yield 0.9
     arms = _cleared(plan, made, going, cyclic=cyclic)
+    yield 0.93
     swimming = segments.swimming(travel.distance)
     reached = _reach(plan, arms, keyed, going)
+    yield 0.96
     warnings = _separate(plan, arms, reached, going, swimming=swimming, cyclic=cyclic)
     _take_time(plan, arms, reached, going, cyclic=cyclic)
     return _Posed(arms, going, keyed, swimming, reached, warnings)
@@ -238,6 +248,19 @@ def glimpse(plan: MotionPlan, frame: float) -> list[Glimpsed]:
     # A scale of 1 as well: what it is elsewhere in the motion is not known here.
     channels += [plan.job.creature.channels.scale(*each) for each in organs.scales.items()]
     return [Glimpsed(each.data_path, each.values[middle - first]) for each in channels]
+
+
+def way_of(plan: MotionPlan) -> tuple[Floats, Floats]:
+    """Where a motion leads, long before it is worked out: places of the body's centre (n, 3) one
+    after the other, and of all footholds (m, 3), world.
+    """
+    standing, when = plan.first.standing, plan.schedule
+    times = np.linspace(0.0, 1.0, _WAY)
+    table = standing.bearings if standing is not None else None
+    centres, _ = plan.segments.places(plan_travel(when.route, when.travel, times, table))
+    walks = [walk for walk in plan.segments.walks if walk is not None]
+    held = [each.position for walk in walks for each in walk.footholds()]
+    return centres, np.array(held, dtype=np.float64).reshape(-1, 3)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -61,6 +61,16 @@ class OctopusShape:
                 ),
                 "Choose longer arms, fewer joints or less taper.",
             )
+
+    def of_arm_length(self, length: float) -> OctopusShape:
+        """The same octopus larger or smaller, with arms of a length in metres.
+
+        Raises:
+            SettingsError: it would be too small.
+        """
+        _check_size("Size", length)
+        share = length / self.arm_length
+        return replace(self, arm_length=length, first_diameter=share * self.first_diameter)
 
     @cached_property
     def diameters(self) -> Floats:

@@ -15,6 +15,7 @@ from mathutils import Matrix
 from ....blender.scene import (
     add_octopus,
     add_route_curve,
+    own_collection,
     show_selected,
     suggested_control_points,
 )
@@ -25,12 +26,14 @@ from ....core.phrases import phrase
 from ...language import reported
 from ...operator_base import OctoOperator, show_in_local_view
 from ...panel_base import armature_in
+from ...preferences import begin_as_preferred, preferred_size
 from ..settings import locomotion_settings
-from .arms import list_arms
+from .arms import collect_arms, list_arms
 
 _Distance: Final = partial(FloatProperty, subtype="DISTANCE", precision=3, step=1)
 _DEFAULT: Final = OctopusShape()
 _SHAPE: Final = ("arms", "joints", "arm_length", "first_diameter", "taper")
+_LENGTHS: Final = ("arm_length", "first_diameter")
 _PLACE: Final = ("align", "location", "rotation")
 
 
@@ -87,6 +90,17 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
         min=0.0,
         max=1.0,
     )
+    size: _Distance(
+        name="Size",
+        description=(
+            "Length of an arm; the body grows with it. 0 for what Arm Length and First Diameter "
+            "say, as scripts get it"
+        ),
+        default=0.0,
+        min=0.0,
+        soft_max=10.0,
+        options={"SKIP_SAVE"},
+    )
     with_mesh: BoolProperty(
         name="Mesh",
         description="Add the skin too, weighted to the bones. Without it the armature comes alone",
@@ -95,23 +109,32 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
 
     ready: BoolProperty(
         name="Ready to Move",
-        description="List its arms, and show it as large as the views can",
+        description=(
+            "Give it a collection of its own, list its arms, and show it as large as the views can"
+        ),
         options={"SKIP_SAVE"},
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
         """Clicked, it is ready to move; a script that says nothing gets the rig alone."""
         self.ready = True
+        given = self.properties.is_property_set
+        if not any(given(name) for name in ("size", *_LENGTHS)):
+            self.size = preferred_size()
         return self.execute(context)
 
     def draw(self, context: bpy.types.Context) -> None:  # noqa: ARG002 - Blender's signature
         layout = cast("Any", self).layout
         layout.use_property_split = True
         # What it is first, where it is last, as in Blender's own Add operators.
-        for names in ((*_SHAPE, "with_mesh"), _PLACE):
-            column = layout.column()
-            for name in names:
+        column = layout.column()
+        column.prop(self, "size")
+        for name in (*_SHAPE, "with_mesh"):
+            if name not in _LENGTHS or not self.size:
                 column.prop(self, name)
+        column = layout.column()
+        for name in _PLACE:
+            column.prop(self, name)
 
     @classmethod
     def obstacle(cls, context: bpy.types.Context) -> str:
@@ -119,12 +142,18 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
 
     def run(self, context: bpy.types.Context) -> None:
         shape = OctopusShape(**{name: getattr(self, name) for name in _SHAPE})
-        armature = add_octopus(context, shape, self._place(context), with_skin=self.with_mesh)
+        if self.size:
+            shape = shape.of_arm_length(self.size)
+        place = self._place(context)
+        armature = add_octopus(context, shape, place, with_skin=self.with_mesh, apart=self.ready)
         show_in_local_view(context, armature, *armature.children)
         if self.ready:
             # What was placed a moment ago counts.
             context.view_layer.update()
-            list_arms(armature, locomotion_settings(armature))
+            settings = locomotion_settings(armature)
+            list_arms(armature, settings)
+            collect_arms(armature, settings)
+            begin_as_preferred(settings, {"keys": "keys"})
             show_selected(context)
 
     def _place(self, context: bpy.types.Context) -> Matrix:
@@ -187,7 +216,7 @@ class OCTO_MOTION_OT_add_route(OctoOperator, bpy.types.Operator):
         points = np.array([getattr(self, name) for name in _POINTS])
         # Raises, before anything is made, if they lead nowhere.
         Route.bezier(points[None])
-        route = add_route_curve("Octopus Route", points, _collection(context))
+        route = add_route_curve("Octopus Route", points, _collection(context, armature))
         show_in_local_view(context, route)
         if armature is None:
             # As other Add operators do, where there is no armature to go on with.
@@ -213,8 +242,11 @@ def draw_route_entry(self: bpy.types.Menu, _context: bpy.types.Context) -> None:
     cast("Any", self).layout.operator(OCTO_MOTION_OT_add_route.bl_idname, icon="CURVE_BEZCURVE")
 
 
-def _collection(context: bpy.types.Context) -> bpy.types.Collection:
-    for collection in (context.collection, context.scene.collection):
+def _collection(
+    context: bpy.types.Context, armature: bpy.types.Object | None
+) -> bpy.types.Collection:
+    own = own_collection(armature) if armature is not None else None
+    for collection in (own, context.collection, context.scene.collection):
         if collection is not None and collection.is_editable:
             return collection
     raise WriteError("The scene is linked from another file.", "Work in a scene of this file.")

@@ -12,6 +12,7 @@ from bpy.props import BoolProperty, EnumProperty
 
 from ....blender.rig import (
     active_armature,
+    armature_data,
     hidden_bones,
     read_skeleton,
     require_editable,
@@ -19,7 +20,7 @@ from ....blender.rig import (
     selected_bones,
     world_directions,
 )
-from ....core.errors import RigError
+from ....core.errors import RigError, WriteError
 from ....core.locomotion.rig import (
     ArmChain,
     Detection,
@@ -31,7 +32,14 @@ from ....core.locomotion.rig import (
 from ....core.phrases import joined_phrases, phrase
 from ...declared_settings import assign
 from ...language import reported, translated
-from ...operator_base import ItemOperator, ListKind, ListOperator, MoveOperator, RemoveOperator
+from ...operator_base import (
+    ArmatureOperator,
+    ItemOperator,
+    ListKind,
+    ListOperator,
+    MoveOperator,
+    RemoveOperator,
+)
 from ...panel_base import ArmaturePanel, ItemRows, draw_list
 from ..reading import add_item, body_axes, bones_of, placed_arms, write_arms, write_body
 from ..settings import AXES, locomotion_settings
@@ -259,6 +267,44 @@ class OCTO_MOTION_OT_arm_select(ItemOperator, bpy.types.Operator):
             )
 
 
+def collect_arms(armature: bpy.types.Object, settings: Any) -> int:
+    """Give each arm of the list a bone collection, by which its bones are selected, shown and
+    hidden; how many there are. Bones stay in those where they are.
+
+    Raises:
+        WriteError: the bones are linked.
+    """
+    data = armature_data(armature)
+    if not data.is_editable:
+        raise WriteError(
+            phrase("The bones of '{armature}' are linked and read-only.", armature=armature.name),
+            "Open the file that they are from.",
+        )
+    for arm in settings.arms:
+        own = data.collections_all.get(arm.name) or data.collections.new(arm.name)
+        for name in bones_of(arm):
+            if name in data.bones:
+                own.assign(data.bones[name])
+    return len(settings.arms)
+
+
+class OCTO_MOTION_OT_arm_collections(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.arm_collections"
+    bl_label = "Bone Collections"
+    bl_description = (
+        "Give each arm of the list a bone collection of its name: Object Data Properties, Bone "
+        "Collections selects, shows and hides the arm from there"
+    )
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        settings = locomotion_settings(armature)
+        if not len(settings.arms):
+            raise RigError("The list has no arms.", "Detect them first.")
+        made = phrase("{count} bone collections.", count=collect_arms(armature, settings))
+        self.report({"INFO"}, reported(made))
+
+
 class OCTO_MOTION_PT_arms(ArmaturePanel, bpy.types.Panel):
     bl_label = "Arms"
     bl_order = 2
@@ -280,6 +326,7 @@ class OCTO_MOTION_PT_arms(ArmaturePanel, bpy.types.Panel):
         buttons.separator()
         buttons.operator(OCTO_MOTION_OT_arm_select.bl_idname, text="", icon="RESTRICT_SELECT_OFF")
         buttons.operator(OCTO_MOTION_OT_arm_flip.bl_idname, text="", icon="ARROW_LEFTRIGHT")
+        buttons.operator(OCTO_MOTION_OT_arm_collections.bl_idname, text="", icon="GROUP_BONE")
         arm = _ARMS.active_item(settings)
         if arm is not None:
             _draw_details(_split_column(layout), arm)

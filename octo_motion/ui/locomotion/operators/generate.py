@@ -31,6 +31,7 @@ from ...declared_settings import assign, plain
 from ...language import reported, translated
 from ...modal_job import Job, ModalJob
 from ...operator_base import ArmatureOperator
+from ...overlay_lines import Lines, draw_lines
 from ..reading import playing_action, previous_action
 from ..settings import (
     SWITCHED,
@@ -138,6 +139,8 @@ class _Work:
     motion: Following | None
     """None while it is made as Generate does."""
     job: Job
+    lines: Lines = field(default_factory=list)
+    """Where it leads, to be drawn until it is there."""
 
 
 @dataclass
@@ -163,14 +166,28 @@ class _State:
 _state: Final = _State()
 
 
+_drawing: Final[list[Any]] = []
+"""Blender's handle of what draws."""
+
+
+def _draw() -> None:
+    """Draw where motions lead that are on their way."""
+    space: Any = bpy.context.space_data
+    if _state.following and space is not None and space.overlay.show_overlays:
+        draw_lines([line for work in _state.following.values() for line in work.lines])
+
+
 def listen() -> None:
     """Listen to Blender."""
     for handlers, function in _handlers():
         handlers.append(function)
+    _drawing.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW"))
 
 
 def listen_no_more() -> None:
     """Listen no more, and drop what was about to be made."""
+    while _drawing:
+        bpy.types.SpaceView3D.draw_handler_remove(_drawing.pop(), "WINDOW")
     _drop()
     _state.clear()
     clear_caches()
@@ -523,12 +540,13 @@ def _follow(name: str, *, certain: bool) -> None:
     if armature.mode == "EDIT" or not _within_scene(armature):
         # Leaving edit mode is a change of its own.
         return
-    if not certain and _state.seen.get(name) == _made_from(armature, settings):
+    now = _made_from(armature, settings)
+    if not certain and _state.seen.get(name) == now:
         return
     with _telling(armature, settings), _deaf(), _window_of(armature):
         _make(armature, settings)
     if settings.live:
-        _state.seen[name] = _made_from(armature, settings)
+        _state.seen[name] = now
 
 
 @contextmanager
@@ -551,7 +569,7 @@ def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> No
     earlier = _state.following.get(armature.name)
     shown = earlier.motion if earlier is not None else None
     motion = Following(armature, bpy.context, shown.before if shown is not None else None)
-    _state.following[armature.name] = _Work(motion, Job(motion.steps()))
+    _state.following[armature.name] = _Work(motion, Job(motion.steps()), motion.lines())
     # Whose action it is that another frame shows again is looked at before it is written.
     scene = bpy.context.scene
     if scene is not None and _generated(armature, settings):

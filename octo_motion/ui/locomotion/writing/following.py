@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Final
 
 import bpy
+import numpy as np
 
 from ....blender.animation import (
     SCALE,
@@ -15,10 +17,16 @@ from ....blender.animation import (
     shown_values,
 )
 from ....blender.rig import bone_and_property
-from ....core.locomotion.motion import glimpse, pose
+from ....core.locomotion.motion import glimpse, pose, way_of
+from ...overlay_lines import Lines
 from ..reading import previous_action
 from ..settings import locomotion_settings
 from .shot import Shot, prepare
+
+_PATH: Final = (1.0, 0.75, 0.2, 0.9)
+_FOOTHOLD: Final = (0.3, 0.9, 0.85, 0.9)
+_MARK: Final = 0.03
+"""Arm lengths: half of a foothold's mark."""
 
 
 class Following:
@@ -48,6 +56,21 @@ class Following:
         """Whether what is written has the keys that Generate makes."""
         self.before: PropertyValues = before if before is not None else {}
         """What the armature was before anything was shown."""
+
+    def lines(self) -> Lines:
+        """The body's way and its footholds, as lines in the world; nothing in place."""
+        job = self.shot.job
+        if job.in_place:
+            return []
+        centres, held = way_of(self._plan)
+        size = _MARK * self._plan.first.poser.arm_length * job.creature.scale
+        ends = size * np.eye(3)[:2]
+        marks = np.stack([held[:, None] - ends, held[:, None] + ends], axis=2).reshape(-1, 3)
+        path = np.repeat(centres, 2, axis=0)[1:-1]
+        return [
+            (points, np.tile(colour, (len(points), 1)), width)
+            for points, colour, width in ((path, _PATH, 2.0), (marks, _FOOTHOLD, 2.5))
+        ]
 
     def show(self, armature: bpy.types.Object, frame: float) -> None:
         """Let the armature be as it is going to be at a frame.
