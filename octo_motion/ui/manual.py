@@ -73,6 +73,10 @@ CHAPTERS: Final = {
     "posing_bones": "which-bones-are-limbs",
     "posing_keys": "keys-and-recording",
     "posing_device": "device",
+    "follow_through": "follow-through",
+    "follow_world": "follow-through",
+    "follow_contacts": "follow-through",
+    "follow_keys": "follow-through",
 }
 """Chapter of each panel, by the end of its class's name."""
 
