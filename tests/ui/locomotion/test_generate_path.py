@@ -46,5 +46,5 @@ def test_generate_passes_few_modules_and_hardly_climbs_back_up() -> None:
     finally:
         sys.setprofile(None)
     assert octopus.animation_data.action is not None
-    assert len(passed) <= MODULES, sorted(passed)
+    assert len(passed) <= MODULES, "\n".join(sorted(passed))
     assert len(climbs) <= CLIMBS, sorted(climbs)
