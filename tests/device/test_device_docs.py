@@ -100,7 +100,7 @@ def test_every_error_of_devices_is_explained() -> None:
                 isinstance(node, ast.Call)
                 and ast.unparse(node.func) in {"DeviceError", "Notice", "messages.Notice"}
                 and node.args
-                and isinstance(node.args[0], ast.Constant | ast.JoinedStr)
+                and isinstance(node.args[0], ast.Constant | ast.JoinedStr | ast.Call)
             ):
                 said.add(pattern_of(node.args[0]))
     page = PAGE.split("## Messages", 1)[1].split("\n## ", 1)[0]
@@ -111,9 +111,14 @@ def test_every_error_of_devices_is_explained() -> None:
     assert set(explained) <= said
 
 
-def pattern_of(node: ast.Constant | ast.JoinedStr) -> str:
+def pattern_of(node: ast.Constant | ast.JoinedStr | ast.Call) -> str:
     if isinstance(node, ast.Constant):
         return str(node.value)
+    if isinstance(node, ast.Call):
+        # A phrase: the text, and what is filled into it.
+        (text, *_) = node.args
+        assert isinstance(text, ast.Constant)
+        return re.sub(r"\{[^}]*\}", "…", str(text.value)).replace("….", "…")
     parts = [str(part.value) if isinstance(part, ast.Constant) else "…" for part in node.values]
     # An ellipsis ends a sentence by itself.
     return "".join(parts).replace("….", "…")
