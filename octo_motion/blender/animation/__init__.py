@@ -18,7 +18,7 @@ from .actions import (
     writable_object,
     write_action,
 )
-from .artist_layer import CYCLES, edit_layer, follow, is_layer, lay_edits, quarters
+from .artist_layer import CYCLES, edit_layer, follow, is_layer, lay_edits
 from .clip_sources import actions_for, still_clip
 from .clips import (
     closes,
@@ -93,7 +93,6 @@ __all__ = [
     "pose_kept",
     "pose_values",
     "posed_channels",
-    "quarters",
     "read_channels",
     "read_clip",
     "read_object_channels",

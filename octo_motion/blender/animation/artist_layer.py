@@ -100,13 +100,6 @@ def follow(
         _shift(layer, np.array(before, dtype=np.float64), after)
 
 
-def quarters(frames: Floats, phases: Floats) -> list[float]:
-    """Frames (n,) at which a gait passes quarters of its cycles; phases are radians."""
-    single, first = np.unique(phases, return_index=True)
-    wanted = 0.5 * np.pi * np.arange(np.floor(single[-1] / (0.5 * np.pi)) + 1.0)
-    return np.interp(wanted, single, frames[first]).tolist()
-
-
 def _shift(layer: bpy.types.Action, before: Floats, after: Floats) -> None:
     """Let keys of a layer stay in their cycles; before the first and after the last with these."""
     count = min(len(before), len(after))

@@ -15,6 +15,8 @@ import octo_motion
 PACKAGE = Path(octo_motion.__file__).parent
 MODULES = 45
 CLIMBS = 4
+WORDS = {"core/phrases.py", "ui/language.py"}
+"""How something is said in another language, wherever it is said: no step of the way."""
 LAYERS = ("core", "device", "blender", "ui", "command_line")
 
 
@@ -33,7 +35,8 @@ def test_generate_passes_few_modules_and_hardly_climbs_back_up() -> None:
         if event != "call" or not file.startswith(f"{PACKAGE}/"):
             return
         here = file.removeprefix(f"{PACKAGE}/")
-        passed.add(here)
+        if here not in WORDS:
+            passed.add(here)
         caller = frame.f_back.f_code.co_filename if frame.f_back is not None else ""
         if caller.startswith(f"{PACKAGE}/"):
             there = caller.removeprefix(f"{PACKAGE}/")

@@ -17,7 +17,7 @@ import numpy as np
 from ....blender.files import curve_node, ensure_weight_curve, load_gait
 from ....blender.rig import armature_data
 from ....core.errors import GaitError
-from ....core.locomotion.gait import GaitSettings, GaitTable
+from ....core.locomotion.gait import GaitSettings, GaitTable, gait_presets
 from ....core.locomotion.metrics import Figure
 from ....core.locomotion.path import TravelSettings
 from ....core.phrases import phrase
@@ -205,7 +205,8 @@ def read_gait(settings: Movement) -> GaitTable:
     """
     if used(settings.table.curves) and settings.table.name == settings.gait:
         return read_table(settings.table)
-    preset = load_gait(settings.gait)
+    # Files are asked for what is not built in alone.
+    preset = gait_presets().get(settings.gait) or load_gait(settings.gait)
     if used(settings.table.curves):
         raise GaitError(
             phrase(

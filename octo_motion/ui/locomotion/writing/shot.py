@@ -19,7 +19,6 @@ from ....blender.animation import (
     key_counts,
     play_bones,
     posed_channels,
-    quarters,
     read_object_channels,
     rest_channel,
     rest_properties,
@@ -362,7 +361,9 @@ class Shot:
         when, standing = made.plan.schedule, made.plan.first.standing
         bearings = standing.bearings if standing is not None else None
         travel = plan_travel(when.route, when.travel, when.times, bearings)
-        return quarters(when.frames, travel.phase)
+        phases, first = np.unique(travel.phase, return_index=True)
+        wanted = 0.5 * np.pi * np.arange(np.floor(phases[-1] / (0.5 * np.pi)) + 1.0)
+        return np.interp(wanted, phases, when.frames[first]).tolist()
 
     def _at_rest(
         self,
