@@ -158,3 +158,16 @@ def test_japanese_lines_fit_the_sidebar_and_begin_with_no_full_stop() -> None:
         "detect",
         "again.",
     ]
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_no_translation_is_of_a_text_that_nobody_says_any_more(name: str) -> None:
+    known = set().union(*texts.catalogue(name).values())
+    assert sorted(known - texts.all_texts() - texts.without_words()) == []
+
+
+@pytest.mark.parametrize("name", COMPLETE)
+def test_nothing_is_left_to_translate(name: str) -> None:
+    """``python -m tests.texts ja_JP`` prints what is."""
+    known = {english for _, english in language.blender_texts(texts.catalogue(name))}
+    assert sorted(texts.all_texts() - known) == []

@@ -263,6 +263,22 @@ def made() -> set[str]:
     return found | {joined_phrases(" ", "x" * count).template for count in (2, 3)}
 
 
+def without_words() -> set[str]:
+    """Phrases of nothing but what is filled in: a language may say them with other signs."""
+    from octo_motion.core.phrases import joined_phrases
+
+    found = {
+        text
+        for tree in sources().values()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and name_of(node.func) == "phrase"
+        for text in constants(node.args[0])
+        if not is_text(text)
+    }
+    rows = [", ", "; "]
+    return found | {joined_phrases(sign, "x" * n).template for sign in rows for n in range(2, 9)}
+
+
 def all_texts() -> set[str]:
     """Every text that a catalogue has to have."""
     return said() | set().union(*registered().values()) | made()
@@ -287,7 +303,7 @@ def main(language: str) -> None:
     there = set().union(*known.values()) if known else set()
     lacking = dict.fromkeys(sorted(texts - there), "")
     print(json.dumps({"*": lacking}, ensure_ascii=False, indent=2))
-    for each in sorted(there - texts):
+    for each in sorted(there - texts - without_words()):
         print("stale:", json.dumps(each, ensure_ascii=False), file=sys.stderr)
 
 

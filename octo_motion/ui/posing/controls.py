@@ -18,7 +18,7 @@ from .puppet_session import PuppetSession
 from .viewport import go_to
 
 HELP: Final = (
-    (phrase("Drag"), phrase("pull")),
+    (phrase("L Drag"), phrase("pull")),
     (phrase("Wheel"), phrase("depth")),
     (phrase("R Drag, Ctrl Wheel"), phrase("turn")),
     (phrase("Shift"), phrase("fine")),
@@ -35,7 +35,7 @@ HELP: Final = (
     (phrase("Esc"), phrase("as it was")),
 )
 MEASURING: Final = (
-    (phrase("Drag"), phrase("bend the limb and let go; then lead it to where it is to stay")),
+    (phrase("L Drag"), phrase("bend the limb and let go; then lead it to where it is to stay")),
     (phrase("Wheel"), phrase("pull")),
     (phrase("M, Enter"), phrase("the figure becomes so")),
     (phrase("Shift M"), phrase("this joint alone")),

@@ -281,7 +281,9 @@ def _choose(_manager: Any, number: int) -> None:
     except RuntimeError as error:
         if bpy.app.background:
             raise
-        told = str(error).removeprefix("Error: ").strip()
+        told = str(error).strip()
+        for kind in ("Error", bpy.app.translations.pgettext_rpt("Error")):
+            told = told.removeprefix(f"{kind}: ")
 
         def tell(menu: Any, _context: bpy.types.Context) -> None:
             menu.layout.label(text=told)
