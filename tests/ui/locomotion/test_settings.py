@@ -73,7 +73,9 @@ def test_every_setting_can_be_overridden_except_names_of_list_items() -> None:
             # Of the window manager: it is in no file.
             continue
         for definition in properties(group):
-            items = {"ArmItem", "ArmBoneItem", "SpliceItem", "ReachItem", "ChangeItem"}
+            items = {"ArmItem", "ArmBoneItem", "SpliceItem", "ReachItem", "ChangeItem"} | {
+                "FollowChain"
+            }
             if group.__name__ in items and definition.identifier in {"name", "known_as"}:
                 continue
             if definition.identifier == "as_text":
