@@ -530,9 +530,12 @@ def test_a_rest_pose_that_nobody_can_stand_in_is_no_hindrance(shared_data: Share
                 # Bodies are built differently; a limb that points elsewhere is off by far more.
                 assert np.degrees(np.arccos(np.sum(ours * theirs, axis=-1).min())) < 40.0
         for side in "LR":
-            ours, theirs = (foot_in_pelvis(each, side)[:frames] for each in bodies)
-            # One has toes, the other just an end.
-            assert np.degrees(np.arccos(np.sum(ours * theirs, axis=-1).min())) < 40.0
+            # One has toes, which lie lower than the ankle, the other just an end that its file puts
+            # level with it: the lines differ by how the feet are built, not by how they turn.
+            ours, theirs = (ankle(each, side)[:frames] for each in bodies)
+            off = np.degrees(ours - theirs)
+            assert np.abs(off).max() < 60.0
+            assert np.ptp(off) < 25.0
 
 
 def foot_in_pelvis(body: ReferredBody, side: str) -> Floats:
@@ -546,6 +549,13 @@ def foot_in_pelvis(body: ReferredBody, side: str) -> Floats:
         :, clip.skeleton.index[body.landmarks[f"foot.{side}"]]
     ]
     return rotate(multiply(conjugate(frame), foot), [0.0, 1.0, 0.0])
+
+
+def ankle(body: ReferredBody, side: str) -> Floats:
+    """Radians (frames,) between a shin and its foot."""
+    knee, foot = (body.seen(body.pelvis, f"{name}.{side}") for name in ("shin", "foot"))
+    shin = normalized(foot - knee)
+    return np.arccos(np.sum(shin * foot_in_pelvis(body, side), axis=-1))
 
 
 def test_the_sources_own_experiment_becomes_new_actions(shared_data: SharedData):

@@ -124,13 +124,14 @@ def test_a_body_scaled_unequally_cannot_be_reckoned_with_and_is_told(octopus: An
 
 def test_bones_that_stretch_get_keys_and_lose_them_again(octopus: Any) -> None:
     scaled = {path for path, _ in keys(generate(octopus)) if path.endswith(".scale")}
-    assert scaled
+    assert any(path.startswith('pose.bones["arm') for path in scaled)
     ground_of(octopus).stretch = 0.0
     bpy.context.scene.frame_set(30)
     again = {path for path, _ in keys(generate(octopus)) if path.endswith(".scale")}
-    assert again == set()
+    # Mantle, siphon and eyes breathe, puff and blink.
+    assert not any(path.startswith('pose.bones["arm') for path in again)
     for bone in octopus.pose.bones:
-        assert tuple(bone.scale) == (1.0, 1.0, 1.0)
+        assert not bone.name.startswith("arm") or tuple(bone.scale) == (1.0, 1.0, 1.0)
     assert warnings(octopus) == []
 
 
