@@ -538,19 +538,6 @@ def test_a_rest_pose_that_nobody_can_stand_in_is_no_hindrance(shared_data: Share
 
 
 def foot_in_pelvis(body: ReferredBody, side: str) -> Floats:
-    """Where a foot points, (frames, 3), in the pelvis's frame."""
-    if body.landmarks.get(f"toe.{side}"):
-        toe, foot = (body.seen(body.pelvis, f"{name}.{side}") for name in ("toe", "foot"))
-        return normalized(toe - foot)
-    clip = body.clip
-    frame = body.pelvis.orientation(posture_of(clip.skeleton, clip.rotations, clip.locations))
-    foot = clip.skeleton.pose(clip.rotations, clip.locations)[0][
-        :, clip.skeleton.index[body.landmarks[f"foot.{side}"]]
-    ]
-    return rotate(multiply(conjugate(frame), foot), [0.0, 1.0, 0.0])
-
-
-def foot_in_pelvis(body: ReferredBody, side: str) -> Floats:
     """How a foot is turned, (frames, 4), in the pelvis's frame."""
     clip = body.clip
     frame = body.pelvis.orientation(posture_of(clip.skeleton, clip.rotations, clip.locations))
