@@ -119,8 +119,8 @@ def test_rigs_of_artists_go_over_bumps(
     shared_data: Callable[[str], Path], file: str, name: str, setup: str
 ) -> None:
     found = figures_on_bumps(opened(shared_data(f"octo/{file}"), name), setup)
-    # Who hurries on bones this long slides more: 0.0055.
-    hold_up(found, slip=0.011 if setup == "hurry" else 0.0025)
+    # Who hurries, or goes on tiptoe, on bones this long slides more: 0.0055 and 0.0026.
+    hold_up(found, slip={"hurry": 0.011, "tiptoe": 0.005}.get(setup, 0.0025))
 
 
 def test_on_six_arms_too_the_rear_pair_tiptoes() -> None:

@@ -41,6 +41,8 @@ def lying() -> Any:
 def test_it_swims_backwards_with_its_back_to_the_sky(lying: Any) -> None:
     octopus = lying.id_data
     bpy.ops.octo_motion.add_route(**LEVEL)
+    # Of itself a mantle swings and swells: that is another matter.
+    lying.body.mantle = lying.body.head = lying.breathing = 0.0
     shot = computed(lying)
     way = np.gradient(shot.measured.poses.locations, axis=0)
     way = (way / np.linalg.norm(way, axis=1, keepdims=True))[8:-8]
@@ -50,7 +52,7 @@ def test_it_swims_backwards_with_its_back_to_the_sky(lying: Any) -> None:
     # Nothing is bent up: the head is before it.
     generate_locomotion(octopus, bpy.context)
     paths = {curve.data_path for curve in curves_of(octopus.animation_data.action)}
-    assert not any("Mantle" in path for path in paths)
+    assert [path for path in paths if "Mantle" in path] == []
 
 
 def test_without_streamline_it_swims_as_any_octopus_does(lying: Any) -> None:

@@ -28,7 +28,7 @@ _WIDEST: Final = 0.34
 """Seconds to either side over which means are taken at most …"""
 _TRIED: Final = (0.125, 0.25, 0.25, 0.5, 0.5, 1.0)
 """… and the shares of that which are taken where the one before was not enough."""
-_TORN: Final = 1.5
+_TORN: Final = 2.0
 """Times that from which on an arm lets go rather than pop: that it holds on is no longer seen."""
 _RESTING: Final = 0.05
 """Seconds before and after a hold in which an arm stays what it is."""
