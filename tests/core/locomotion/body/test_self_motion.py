@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from octo_motion.core.errors import RigError, SettingsError
-from octo_motion.core.locomotion.body.by_itself import (
+from octo_motion.core.locomotion.body import (
     BodySettings,
     BodyTrack,
     SelfMotion,
     find_organs,
     self_motion,
-    sprung,
     steps_of,
 )
+from octo_motion.core.locomotion.body.track import sprung
 from octo_motion.core.locomotion.octopus import OctopusShape, build_bones
 from octo_motion.core.locomotion.rig import BodyFrame, body_frame
 from octo_motion.core.skeleton import Skeleton

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.body.by_itself import Holds, Surge, surge
+from octo_motion.core.locomotion.body import Holds, Surge, surge
 
 LENGTH, STRIDE, REACH = 4.0, 0.8, 1.0
 
