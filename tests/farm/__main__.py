@@ -146,10 +146,11 @@ def troubles(cluster: Slurm, folder: Path) -> list[str]:
         for _ in range(4):
             yield
         cluster.start_node()
-        running = cluster.run("squeue", "--noheader", "--array", "--states=R", "--format=%F_%K")
-        if running:
-            cluster.run("scontrol", "requeue", running.split()[-1])
-            print(f"put back by hand: {running.split()[-1]}")
+        # Not the first: it hangs, and its time has to end it.
+        while not (chosen := [task for task in cluster.running() if not task.endswith("_1")]):
+            yield
+        cluster.run("scontrol", "requeue", chosen[-1])
+        print(f"put back by hand: {chosen[-1]}")
 
     cluster.wait(trouble())
     bake(job, "--gather")

@@ -93,6 +93,11 @@ class Slurm:
         given = {"CHUNK": str(chunk), "BLENDER": str(blender)}
         return self.run("sbatch", *words, **given).strip()
 
+    def running(self) -> list[str]:
+        """Tasks that run now, each as job_index."""
+        words = ("--noheader", "--array", "--states=R", "--format=%F_%K")
+        return self.run("squeue", *words).split()
+
     def wait(self, meanwhile: Iterator[None] | None = None) -> None:
         """Wait until nothing is left in the queue; ``meanwhile`` is gone on with twice a second."""
         while self.run("squeue", "--noheader", "--array").strip():

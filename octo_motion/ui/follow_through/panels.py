@@ -7,6 +7,7 @@ from typing import Any, Final
 
 import bpy
 
+from ..floor import draw_floor
 from ..panel_base import ArmaturePanel, draw_list
 from .operators import (
     OCTO_MOTION_OT_follow_add,
@@ -88,11 +89,7 @@ class OCTO_MOTION_PT_follow_contacts(_Panel, bpy.types.Panel):
     def show(self, layout: Any, settings: Any) -> None:
         layout.prop(settings, "body")
         layout.prop(settings, "self_collision")
-        row = layout.row(heading="Floor")
-        row.prop(settings, "floor", text="")
-        height = row.row()
-        height.active = settings.floor
-        height.prop(settings, "floor_height", text="")
+        draw_floor(layout, settings)
         layout.prop(settings, "use_obstacles")
         layout.prop(settings, "friction")
 

@@ -12,6 +12,7 @@ from ...blender.rig import armature_data
 from ...core.follow_through import FollowSettings
 from .. import declared_settings as props
 from ..declared_settings import declared, make_overridable
+from ..floor import Floor
 
 RESULTS: Final = (
     ("LAYER", "New Layer", "A layer of the NLA over the action, which itself stays as it is", 0),
@@ -68,7 +69,7 @@ class FollowPhysics:
     __annotations__ = {each: declared(FollowSettings, each) for each in _DECLARED}
 
 
-class OCTO_MOTION_PG_follow_through(FollowPhysics, bpy.types.PropertyGroup):
+class OCTO_MOTION_PG_follow_through(Floor, FollowPhysics, bpy.types.PropertyGroup):
     """Settings of follow-through."""
 
     chains: props.CollectionProperty(
@@ -84,14 +85,6 @@ class OCTO_MOTION_PG_follow_through(FollowPhysics, bpy.types.PropertyGroup):
         size=3,
         soft_min=-30.0,
         soft_max=30.0,
-    )
-    floor: props.BoolProperty(name="Floor", description="A solid floor through the whole scene")
-    floor_height: props.FloatProperty(
-        name="Height",
-        description="Height of the floor",
-        subtype="DISTANCE",
-        soft_min=-10.0,
-        soft_max=10.0,
     )
     use_obstacles: props.BoolProperty(
         name="Obstacles",

@@ -12,6 +12,7 @@ from ...device.calibration import Phase, reached
 from ...device.driver import Kind
 from ...device.hid import why_not_read
 from ...device.messages import DeviceMessage
+from ..floor import draw_floor
 from ..language import translated
 from ..operator_base import window_manager
 from ..panel_base import ArmaturePanel, draw_sentence
@@ -81,11 +82,7 @@ class OCTO_MOTION_PT_posing_world(PosePanel, bpy.types.Panel):
 
     def show(self, layout: Any, settings: Any) -> None:
         layout.prop(settings, "gravity")
-        row = layout.row(heading="Floor")
-        row.prop(settings, "floor", text="")
-        height = row.row()
-        height.active = settings.floor
-        height.prop(settings, "floor_height", text="")
+        draw_floor(layout, settings)
         layout.prop(settings, "use_obstacles")
         layout.prop(settings, "self_collision")
         layout.prop(settings, "friction")

@@ -12,6 +12,7 @@ from ...blender.rig import armature_data
 from ...core.posing.puppet import SMALLEST
 from .. import declared_settings as props
 from ..declared_settings import make_overridable
+from ..floor import Floor
 
 MATERIALS: Final = (
     ("CLAY", "Clay", "Gives way slowly and stays: as soft as it is pulled", 0),
@@ -78,7 +79,7 @@ TARGETS: Final = (
 )
 
 
-class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
+class OCTO_MOTION_PG_posing(Floor, bpy.types.PropertyGroup):
     """Settings of posing by hand."""
 
     # --- The puppet ----------------------------------------------------------------------------
@@ -163,17 +164,6 @@ class OCTO_MOTION_PG_posing(bpy.types.PropertyGroup):
     # --- The world -----------------------------------------------------------------------------
 
     gravity: props.BoolProperty(name="Gravity", description="Let the figure have weight")
-    floor: props.BoolProperty(
-        name="Floor",
-        description="A solid floor through the whole scene",
-    )
-    floor_height: props.FloatProperty(
-        name="Height",
-        description="Height of the floor",
-        subtype="DISTANCE",
-        soft_min=-10.0,
-        soft_max=10.0,
-    )
     use_obstacles: props.BoolProperty(
         name="Obstacles",
         description="Objects that are marked as solid stop the figure",
