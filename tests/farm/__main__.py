@@ -162,10 +162,11 @@ def troubles(cluster: Slurm, folder: Path) -> list[str]:
 def at_scale(cluster: Slurm, folder: Path, shots: int) -> list[str]:
     """Many shots, a third of whose tasks are killed at random and put back."""
     job, program = jobs.make_job(folder, shots), jobs.blender(folder)
+    alone = bake(jobs.make_job(folder / "alone", CHUNK), "--here")
     began = time.monotonic()
     cluster.submit(job, program, shots, CHUNK)
     (folder / "starts").touch()
-    cluster.wait(killer(folder / "starts", 0.34, seed=1))
+    cluster.wait(killer(folder / "starts", 1 / 3, alone, seed=1))
     took = time.monotonic() - began
     killed = folder / "killed"
     count = len(killed.read_text(encoding="utf-8").split()) if killed.exists() else 0

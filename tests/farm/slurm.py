@@ -152,8 +152,10 @@ def slurm(folder: Path) -> Iterator[Slurm]:
                 os.kill(int(pid.read_text(encoding="utf-8")), signal.SIGTERM)
 
 
-def killer(starts: Path, share: float, seed: int) -> Iterator[None]:
-    """Kill a share of the processes that are noted in a file, each at a moment of its own."""
+def killer(starts: Path, share: float, seconds: float, seed: int) -> Iterator[None]:
+    """Kill a share of the processes that are noted in a file, each at a moment of its own within
+    the seconds that it takes.
+    """
     chance = random.Random(seed)  # noqa: S311 - no secret
     seen: set[int] = set()
     due: list[tuple[float, int]] = []
@@ -163,7 +165,7 @@ def killer(starts: Path, share: float, seed: int) -> Iterator[None]:
             if number not in seen:
                 seen.add(number)
                 if chance.random() < share:
-                    due.append((time.monotonic() + chance.uniform(0.0, 20.0), pid))
+                    due.append((time.monotonic() + chance.uniform(0.0, seconds), pid))
         now = time.monotonic()
         for moment, pid in [each for each in due if each[0] <= now]:
             due.remove((moment, pid))
