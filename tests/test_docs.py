@@ -190,6 +190,8 @@ def described(group: str) -> dict[str, list[str]]:
             return rows(section("## Change of gait").split("An item of", 1)[0])
         case "place":
             return rows(after("An item of `places`:", "## Change of gait"))
+        case "along":
+            return rows(after("An item of `along`:", "## Settings along the route"))
         case "body":
             return rows(section("## Body"))
         case "ground":
@@ -245,6 +247,7 @@ def group_class(group: str) -> Any:
         "body": body.OCTO_MOTION_PG_body,
         "change": lists.OCTO_MOTION_PG_change,
         "place": lists.ChangeItem,
+        "along": lists.AlongItem,
         "landmarks": OCTO_MOTION_PG_landmarks,
         "posing": OCTO_MOTION_PG_posing,
         "splicing": OCTO_MOTION_PG_splicing,
@@ -310,7 +313,7 @@ def number(value: float, definition: Any) -> str:
     "group",
     [
         *("locomotion", "arm", "bone", "reach", "change", "place", "ground", "contact", "body"),
-        "figure",
+        *("figure", "along"),
         *("table", "curve", "knot", "offset", "note"),
         *("splicing", "splice", "landmarks", "posing"),
         *("follow_through", "chain"),

@@ -248,6 +248,8 @@ def _apply(shot: ShotRequest, armature: bpy.types.Object, scene: bpy.types.Scene
         _filled(settings.change, "places", shot.changes)
         if "change.by" not in shot.settings:
             settings.change.by = "MARKERS" if shot.changes else "NONE"
+    if shot.along is not None:
+        _filled(settings, "along", shot.along)
     if shot.reaches is not None:
         names = [each.get("target") for each in shot.reaches]
         targets = [_object(name) if name else None for name in names]
@@ -284,10 +286,10 @@ def _filled(settings: Any, name: str, items: Sequence[Mapping[str, Any]]) -> Non
     """
     collection = getattr(settings, name)
     linked = linked_names(settings, name)
-    if linked and name == "places":
+    if linked and name in {"places", "along"}:
         raise SettingsError(
-            "Places of a linked file where the gait changes cannot be taken away.",
-            "Leave changes out, or open the linked file itself.",
+            "Places of a linked file where the gait or a setting changes cannot be taken away.",
+            "Leave changes and along out, or open the linked file itself.",
         )
     for number in reversed(range(len(collection))):
         if collection[number].name not in linked:

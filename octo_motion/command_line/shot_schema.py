@@ -79,6 +79,7 @@ class NewSplice:
     """Values of the item by name, the part among them, and ``landmarks.NAME`` of the source."""
 
 
+# In one piece, for it is a job's table as it is written.
 @dataclass(frozen=True)
 class ShotRequest:
     """What one shot is made from, and what is made of it: its keys in a job file."""
@@ -97,8 +98,9 @@ class ShotRequest:
     gait: str | Path = ""
     """The gait table as JSON, a file that is still to be read, or "" for the armature's own."""
     changes: list[Settings] | None = None
-    """Items of the list, as in the file if not given; so are the next two. Of a shot that follows,
-    its chains."""
+    """Items of the list, as in the file if not given; so are the next three. Of a shot that
+    follows, its chains."""
+    along: list[Settings] | None = None
     reaches: list[Settings] | None = None
     contacts: list[Settings] | None = None
     script: Path | None = None
@@ -459,6 +461,9 @@ KINDS: Final[dict[str, dict[str, Key]]] = {
             "ground": _named("the mesh to walk on; default: its own"),
             "gait": Key(_gait, Option("a gait by name, or a gait file (.json)")),
             "changes": _items("changes", '{ gait = "swim", position = 0.5 }', "gait", "position"),
+            "along": _items(
+                "along", '{ setting = "PACE", position = 0.5, pace = 2.0 }', "position"
+            ),
             "reaches": _items(
                 "reaches", '{ target = "Ball", arm = "Arm 1 L", frame_contact = 40 }'
             ),

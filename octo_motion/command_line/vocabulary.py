@@ -17,7 +17,7 @@ from ..core.errors import ClipError, OctoMotionError, SettingsError
 from ..core.locomotion.gait import gait_to_json
 from ..core.splicing.clip import MOTION_SUFFIXES, check_bvh
 from ..ui.follow_through import FollowChain, OCTO_MOTION_PG_follow_through
-from ..ui.locomotion import ChangeItem, ContactItem, OCTO_MOTION_PG_locomotion, ReachItem
+from ..ui.locomotion import AlongItem, ChangeItem, ContactItem, OCTO_MOTION_PG_locomotion, ReachItem
 from ..ui.splicing import (
     PARTS,
     OCTO_MOTION_PG_landmarks,
@@ -33,6 +33,7 @@ _OWN_KEYS = {"name", "gait"}
 BACKSLASHES = "Write / between folders: every system takes it."
 """What to do about paths as Windows writes them."""
 _LISTED = {
+    "along": AlongItem,
     "changes": ChangeItem,
     "reaches": ReachItem,
     "contacts": ContactItem,

@@ -121,6 +121,7 @@ def test_ground_and_lists_are_what_the_table_says(tmp_path: Path) -> None:
         'ground = "Sea Floor"\n'
         'settings = { change.height = 0.7, change.gait = "jet_escape", ground.duty = 0.6 }\n'
         'changes = [{ gait = "swim", position = 0.5 }]\n'
+        'along = [{ setting = "lift", position = 0.5, lift = 0.2 }]\n'
         'reaches = [{ mode = "curl", arm = "Arm 1 L", turns = 1.5, frame_contact = 20 }]\n'
         '[[shots.contacts]]\narm = "Arm 2 R"\ncycle = 3\nposition = [1, 0.5, 0]\n'
         'heading = "90°"\n'
@@ -130,6 +131,7 @@ def test_ground_and_lists_are_what_the_table_says(tmp_path: Path) -> None:
     assert shot.ground == "Sea Floor"
     assert shot.settings["change.gait"] == "jet_escape"
     assert shot.changes == [{"gait": "swim", "position": 0.5}]
+    assert shot.along == [{"setting": "LIFT", "position": 0.5, "lift": 0.2}]
     assert shot.reaches == [{"mode": "CURL", "arm": "Arm 1 L", "turns": 1.5, "frame_contact": 20}]
     assert shot.contacts == [
         {

@@ -57,10 +57,12 @@ def test_lists_take_the_place_of_those_in_the_file(octopus: Any) -> None:
     settings = octopus.octo_motion.locomotion
     click("contacts_show")
     settings.change.places.add()
+    settings.along.add()
     settings.reaches.add()
     arm = settings.arms[2].name
     lists: dict[str, Any] = {
         "changes": [{"gait": "swim", "position": 0.6, "length": 1.0}],
+        "along": [{"setting": "PACE", "position": 0.25, "pace": 2.0}],
         "reaches": [{"mode": "CURL", "arm": arm, "frame_start": 5, "frame_contact": 20}],
         "contacts": [
             {"arm": arm, "cycle": 1, "removed": True},
@@ -80,7 +82,11 @@ def test_lists_take_the_place_of_those_in_the_file(octopus: Any) -> None:
         (arm, 1, True, False),
         (arm, 2, False, True),
     ]
+    assert [(each.setting, each.position, each.pace) for each in settings.along] == [
+        ("PACE", 0.25, 2.0)
+    ]
     perform(shot(changes=[]), {})
+    assert len(settings.along) == 1
     assert settings.change.by == "NONE"
     assert len(settings.reaches) == 1
 

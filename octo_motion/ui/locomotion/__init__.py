@@ -5,6 +5,7 @@ from ..steps import Step
 from . import operators, panels, settings, target_overlay
 from .operators import MENUS
 from .settings import (
+    AlongItem,
     ChangeItem,
     ContactItem,
     OCTO_MOTION_PG_contact,
@@ -26,6 +27,7 @@ __all__ = [
     "CLASSES",
     "MENUS",
     "STEPS",
+    "AlongItem",
     "ChangeItem",
     "ContactItem",
     "OCTO_MOTION_PG_contact",

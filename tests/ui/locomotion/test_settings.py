@@ -24,6 +24,7 @@ from tests.ui.rig import give_route, make_octopus
 
 # What scripts rely on: a name is never changed or removed.
 NAMES = {
+    *("along", "active_along"),
     *("arms", "active_arm", "body_front", "body_up", "root_bone", "keep_pose"),
     *("route", "spline", "speed_mode", "ease_in", "ease_out"),
     *("heading", "heading_angle", "keep_upright", "look_ahead", "corner"),
@@ -74,7 +75,7 @@ def test_every_setting_can_be_overridden_except_names_of_list_items() -> None:
             continue
         for definition in properties(group):
             items = {"ArmItem", "ArmBoneItem", "SpliceItem", "ReachItem", "ChangeItem"} | {
-                "FollowChain"
+                *("FollowChain", "AlongItem")
             }
             if group.__name__ in items and definition.identifier in {"name", "known_as"}:
                 continue

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...rotations import Floats, continuous, multiply, normalized, rotate, shortest_arc
 from ..gait import CYCLE
-from ..path import Bearings, Route, TravelSettings, walked_at
+from ..path import Bearings, Route, TravelSettings, values_along, walked_at
 from .crawl_planner import CrawlPath, CrawlSettings, CrawlStances, plan_crawl
 from .surface import Ground
 
@@ -51,13 +51,13 @@ class BodyLine:
     route: Route
     settings: TravelSettings
     bearings: Bearings
-    clearance: float
-    """Metres from the ground to the body's centre."""
     start: float
     """Metres along the route of the table's first place."""
     spacing: float
     heights: Floats
     """(n,) world Z of the ground as the body feels it."""
+    clearances: Floats
+    """(n,) metres from there to the body's centre."""
     uprights: Floats
     """(n, 3) unit vectors: which way up the body is."""
     ways: Floats
@@ -72,7 +72,8 @@ class BodyLine:
         """
         upright = normalized(self._at(self.uprights, distance))
         centre = positions.copy()
-        centre[..., 2] = self._at(self.heights, distance) + self.clearance / upright[..., 2]
+        clearance = self._at(self.clearances, distance)
+        centre[..., 2] = self._at(self.heights, distance) + clearance / upright[..., 2]
         return centre, upright
 
     def at(self, distance: ArrayLike) -> tuple[Floats, Floats]:
@@ -115,12 +116,12 @@ def body_line(
 
     Args:
         route: where to.
-        settings: how it travels.
+        settings: how it travels, and what of the following differs along the route.
         bearings: the route's directions.
         ground: what it walks on.
         clearance: metres from the ground to the body's centre.
         reach: metres that its arms are long.
-        lean: 0 stays upright, 1 leans as the ground does.
+        lean: 0 stays upright, 1 leans as the ground does, unless the settings have it.
         smoothing: reaches over which the ground is evened out along the way (standard deviation).
         under: metres from the body's centre to its lowest skin.
     """
@@ -134,24 +135,27 @@ def body_line(
     left = np.stack([-along[:, 1], along[:, 0]], axis=1)
     felt = ground.height(positions[:, None, :2] + reach * _ACROSS[:, None] * left[:, None])
     kernel = _bell(width / spacing)
-    headroom = max(_HEADROOM * clearance, min(under, _MOST_HEADROOM * clearance))
+    share = distance / route.length
+    clearances = clearance + values_along(settings.along.height, share, 0.0)
+    headroom = np.maximum(_HEADROOM * clearances, np.minimum(under, _MOST_HEADROOM * clearances))
     level = _over_bumps(
-        _evened(felt @ _SHARES, kernel), felt, (clearance, headroom), _bell(0.5 * width / spacing)
+        _evened(felt @ _SHARES, kernel), felt, (clearances, headroom), _bell(0.5 * width / spacing)
     )
     ahead = np.gradient(level, spacing)
     # Least squares through the heights across the way.
     sideways = _evened(felt @ _ACROSS / (_ACROSS @ _ACROSS * reach), kernel)
     tilt = -ahead[:, None] * along - sideways[:, None] * left
     leaned = normalized(np.concatenate([tilt, np.ones((count, 1))], axis=1))
-    uprights = normalized((1.0 - lean) * _UP + lean * leaned)
+    leans = values_along(settings.along.lean, share, lean)[:, None]
+    uprights = normalized((1.0 - leans) * _UP + leans * leaned)
     return BodyLine(
         route=route,
         settings=settings,
         bearings=bearings,
-        clearance=clearance,
         start=float(distance[0]),
         spacing=spacing,
         heights=level,
+        clearances=clearances,
         uprights=uprights,
         ways=positions,
         turns=continuous(turns),
@@ -159,7 +163,7 @@ def body_line(
 
 
 def _over_bumps(
-    level: Floats, felt: Floats, heights: tuple[float, float], kernel: Floats
+    level: Floats, felt: Floats, heights: tuple[Floats, Floats], kernel: Floats
 ) -> Floats:
     """Heights (n,) raised where a bump right under the body would come too near to it.
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from ...rotations import Floats, rotate, rotate_in_plane
 from ..gait import CYCLE
-from ..path import Line
+from ..path import Line, values_along
 from .arm_curves import laid
 from .contact_timing import ContactTiming
 from .surface import Ground, HeightField, Limbs, StanceSettings, normals, touching
@@ -124,11 +124,13 @@ def easy_height(
     return float(np.sqrt(max(level, 0.0)) + radii[joint])
 
 
-def stance_times(settings: StanceSettings) -> tuple[tuple[float, float, float], ...]:
-    """Times that :func:`spots` wants to know the roots at, for holds cut down more and more."""
+def stance_times(duty: Floats) -> tuple[tuple[Floats, Floats, Floats], ...]:
+    """Times (arms, cycles) that :func:`spots` wants to know the roots at, for holds of so many
+    cycles (arms, cycles) cut down more and more.
+    """
     return tuple(
         (-0.5 * width, (0.5 - PEELING) * width, 0.5 * width)
-        for width in (settings.duty * share for share in _SHORTENED)
+        for width in (duty * share for share in _SHORTENED)
     )
 
 
@@ -136,7 +138,7 @@ def spots(
     limbs: Limbs,
     ground: Ground,
     settings: StanceSettings,
-    passings: Iterable[Passing],
+    passings: Iterable[tuple[Floats, Passing]],
     *,
     aim: Floats,
     away: Floats,
@@ -147,7 +149,8 @@ def spots(
         limbs: the arms.
         ground: what they touch.
         settings: how they hold on.
-        passings: the body's, for each of :func:`stance_times`.
+        passings: half of how long holds last (arms, cycles), in cycles, and the body's passing
+            meanwhile, for each of :func:`stance_times`.
         aim: (arms, cycles, 2) unit vectors in which the arms are to touch, world.
         away: (arms, cycles) metres from the root, seen from above, at which they are to do so if
             they can; nan for where it is easy.
@@ -160,11 +163,11 @@ def spots(
     shape = aim.shape[:2]
     distance, half, short = np.zeros(shape), np.zeros(shape), np.full(shape, np.inf)
     undecided = np.ones(shape, dtype=bool)
-    for times, passing in zip(stance_times(settings), passings, strict=False):
+    for lasts, passing in passings:
         found, lack = _spot(ground, reach, passing, aim, away)
         better = undecided & (lack < short)
         distance = np.where(better, found, distance)
-        half = np.where(better, times[2], half)
+        half = np.where(better, lasts, half)
         short = np.where(better, lack, short)
         undecided &= short > 0.0
         if not np.any(undecided):
@@ -485,10 +488,18 @@ class _RootPath:
 
     def at(self, since: Floats) -> tuple[Floats, Floats]:
         """World positions (arms, cycles, 3) and the body's orientations, at times since then."""
-        middles = self.middle + self.numbers.astype(np.float64)
-        distances = self.timing.distances(self.limbs.arms, middles + since)
-        centres, rotations = self.line.at(distances)
+        centres, rotations = self.line.at(self._distances(since))
         return centres + rotate(rotations, self.limbs.roots[:, None]), rotations
+
+    def duty(self, settings: StanceSettings, shift: Floats) -> Floats:
+        """Cycles (arms, cycles) that stances last which are shifted by so many (arms, cycles)."""
+        share = self._distances(shift) / self.line.route.length
+        return values_along(self.line.settings.along.hold, share, settings.duty)
+
+    def _distances(self, since: Floats) -> Floats:
+        """Metres (arms, cycles) along the route at times since the middles of stances."""
+        middles = self.middle + self.numbers.astype(np.float64)
+        return self.timing.distances(self.limbs.arms, middles + since)
 
 
 def _places(
@@ -507,8 +518,8 @@ def _places(
     aim, lie = rotate_in_plane(aim, aside), rotate_in_plane(lie, aside)
     # One after the other, for the first will do for nearly all.
     passings = (
-        Passing(roots, [path.at(shift + each)[0] for each in times])
-        for times in stance_times(settings)
+        (times[2], Passing(roots, [path.at(shift + each)[0] for each in times]))
+        for times in stance_times(path.duty(settings, shift))
     )
     distance, half = spots(limbs, ground, settings, passings, aim=aim, away=away + farther)
     spot = roots.copy()

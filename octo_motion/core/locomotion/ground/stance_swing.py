@@ -261,10 +261,10 @@ def kept_over_ground(
     pose: tuple[Floats, Floats],
     stance: Stance,
     ground: Ground,
-    settings: StanceSettings,
+    lift: Floats,
 ) -> StancePose:
     """Arms that are in the air brought off the ground, by strains and directions as
-    :func:`pulled_to_footholds` returns them.
+    :func:`pulled_to_footholds` returns them, half way so many arm lengths (batch,) high.
     """
     (strains, directions), weight, reach = pose, stance.weight, batch.reach
     lengths = batch.lengths * (1.0 + strains)
@@ -276,7 +276,7 @@ def kept_over_ground(
         free = _freedom(part, own)
         whole = part.reach[-1]
         # What has lain is as high as its skin is thick, and no higher yet.
-        rising = (settings.lift * away**2 + MARGIN * off_ground) * whole + part.lift
+        rising = (lift[swinging] * away**2 + MARGIN * off_ground) * whole + part.lift
         # In the air an arm may roll: any side of it may come to be below.
         rolled = smooth_step(np.cbrt(away / _STARTING) / _ROLLED)
         near = part.radii.copy()

@@ -12,7 +12,7 @@ import numpy as np
 from ...rotations import Floats, components_first, conjugate, from_matrix, multiply, rotate
 from ...skeleton import Skeleton
 from ..gait import CYCLE, Build, GaitPoser, bone_twists
-from ..path import Line
+from ..path import Line, values_along
 from ..rig import ArmSkin, BodyFrame, Facing, rotate_bones, sucker_sides
 from .arm_curves import Seen, skin_below
 from .contact_timing import ContactTiming, EvenTiming
@@ -147,6 +147,8 @@ class Moments:
     """(frames, 4) of the canonical body, world."""
     to_armature: Floats
     """(frames, 4) from the world to the armature."""
+    lift: Floats
+    """(frames,) arm lengths that arms are above the ground at least in the middle of a swing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +241,8 @@ class WalkPart:
             before, share = ways, airborne(stance).reshape(frames, many)
             ways = smoothing.evened(ways.reshape(each_frame), share).reshape(ways.shape)
             evened = (ways - before).reshape(each_frame)
-        pose = kept_over_ground(arms, (strains, ways), stance, self.ground, self.settings)
+        lift = np.repeat(moments.lift, many)
+        pose = kept_over_ground(arms, (strains, ways), stance, self.ground, lift)
         twists = bone_twists(self.build, moments.angles[:, columns])
         joints = pose.joints.reshape(bones + 1, 3, frames, many)
         in_contact = pose.in_contact.reshape(bones + 1, frames, many)
@@ -387,7 +390,7 @@ class GroundedWalk:
         cyclic: bool = False,
         skins: Sequence[ArmSkin] = (),
     ) -> None:
-        self._poser, self._line, self._ground = poser, line, ground
+        self._poser, self._line, self._ground, self._settings = poser, line, ground, settings
         self._scale, self._cyclic = scale, cyclic
         self._middle = poser.settings.gait.power_phase
         self._body_turn = from_matrix(body.rotation)
@@ -498,7 +501,9 @@ class GroundedWalk:
         angles, steering = self._poser.asked(phases, turn, self._timing.cycle_period)
         cycles, since = cycles_at(phases, self._middle)
         to_armature = multiply(self._body_turn, conjugate(orientations))
-        moments = Moments(angles, steering, cycles, since, centres, orientations, to_armature)
+        moments = Moments(
+            angles, steering, cycles, since, centres, orientations, to_armature, self._lift(phase)
+        )
         parts = [
             part.pose(number, moments, higher, smoothing) for number, part in enumerate(self._parts)
         ]
@@ -521,6 +526,11 @@ class GroundedWalk:
             tuple(each.shapes for each in parts if each.shapes is not None),
             tuple(each.evened for each in parts if each.evened is not None),
         )
+
+    def _lift(self, phase: Floats) -> Floats:
+        """Arm lengths (frames,) that arms are lifted at the body's phases (frames,)."""
+        share = phase / CYCLE * self._stride / self._line.route.length
+        return values_along(self._line.settings.along.lift, share, self._settings.lift)
 
     @property
     def builds(self) -> tuple[tuple[int, ...], ...]:

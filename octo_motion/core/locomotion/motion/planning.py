@@ -30,6 +30,7 @@ from ..path import (
     bearings_of,
     check_transitions,
     duration,
+    paced_time,
     plan_travel,
     route_in_place,
     strides,
@@ -94,7 +95,9 @@ def pace_of(route: Route, travel: TravelSettings, frames: float) -> Pace:
     """The pace of a journey that takes so many frames, which need not be whole."""
     mean = frames / max(strides(route, travel), 1e-9)
     # While it eases in and out, the body is slower than in between.
-    return Pace(mean, mean * route.length / duration(route, travel, 1.0))
+    paced = paced_time(route, travel)
+    fastest = 1.0 if paced is None else paced.fastest
+    return Pace(mean, mean * route.length / duration(route, travel, 1.0) / fastest)
 
 
 def too_few_frames(timing: Timing, pace: Pace) -> list[str]:
@@ -208,7 +211,7 @@ class MotionPlan:
     def height(self) -> float:
         """Metres from the route to the body's centre."""
         standing = self.first.standing
-        return standing.line.clearance if standing is not None else self.first.height
+        return float(standing.line.clearances[0]) if standing is not None else self.first.height
 
     @property
     def wants_subframes(self) -> bool:
@@ -251,8 +254,12 @@ def schedule(job: MotionJob) -> Schedule:
     travel = _travel(job, first, lean)
     route = job.route or route_in_place(travel.stride, job.cycles)
     if first.settings.gait.on_ground and job.ground is not None and any(job.ground.rest):
-        start, end = (job.ground.rest_within * travel.stride * each for each in job.ground.rest)
-        travel = unhurried(travel, route.length, start=start, end=end)
+        within = job.ground.rest_within * travel.stride * np.array(job.ground.rest)
+        if (paced := paced_time(route, travel)) is not None:
+            # As far as it would come meanwhile if it had the same pace everywhere.
+            shares = np.minimum(within / route.length, 1.0)
+            within = route.length * np.abs(paced.times(np.abs([0.0, 1.0] - shares)) - [0.0, 1.0])
+        travel = unhurried(travel, route.length, start=within[0], end=within[1])
     seconds, frames, times = _timing(job, route, travel)
     return Schedule(route, travel, frames, times, seconds, head, lean)
 
@@ -285,7 +292,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         # Contacts are places in the world; in place the ground goes by.
         asked = () if job.in_place else overrides
         walk = standing.walk(standing.line, asked) if standing is not None else None
-        segments = Segments(gaits, [walk], None, [len(each) for each in job.creature.bones])
+        segments = Segments(gaits, [walk], None, [len(each) for each in job.creature.bones], route)
     pace = pace_of(route, when.travel, when.seconds * job.timing.rate)
     warnings = [*job.warnings, *(standing.warnings if standing is not None else ())]
     if standing is not None or changes:
@@ -362,9 +369,11 @@ def _poser(job: MotionJob, gait: GaitJob, lean: float) -> GaitPoser:
 
 def _travel(job: MotionJob, gait: GaitJob, lean: float) -> TravelSettings:
     """How the body travels in a gait."""
+    reach = _arm_length(job) * job.creature.scale
     travel = replace(
         gait.travel,
-        stride=gait.travel.stride * _arm_length(job) * job.creature.scale,
+        stride=gait.travel.stride * reach,
+        along=gait.travel.along.scaled(reach),
         lean=0.0 if gait.settings.gait.on_ground else lean,
     )
     return travel_in_place(travel) if job.in_place else travel
@@ -601,7 +610,8 @@ def _with_transitions(
                     for cycle in cycles[left_out[arm]]
                 )
         found.append(window)
-    return Segments(gaits, _walks(gaits, course, asked), Transitions(changes, found, course), bones)
+    transitions = Transitions(changes, found, course)
+    return Segments(gaits, _walks(gaits, course, asked), transitions, bones, route)
 
 
 def _line(

@@ -58,9 +58,11 @@ from ..path import (
     Windows,
     bearings_of,
     blend_motions,
+    raised_along,
     slowing,
     strides,
     travel_at,
+    values_along,
     walked_at,
     way_weights,
 )
@@ -218,6 +220,7 @@ def _timing(
 ) -> ContactTiming | None:
     """When arms hold on, where that is not the gait's own even timing."""
     gait, stance, timing = poser.settings.gait, job.stance, None
+    hold = line.settings.along.hold
     if gait.manner == "CRAWL":
         near, far = span(stance, may_stretch=any(job.may_stretch))
         settings = CrawlSettings(near, far, planted=stance.planted, seed=poser.settings.seed)
@@ -238,7 +241,7 @@ def _timing(
         start=job.rest[0],
         end=job.rest[1],
         middle=gait.power_phase,
-        duty=stance.duty,
+        duty=float(values_along(hold, [0.0, 1.0], stance.duty).min()),
     )
 
 
@@ -386,6 +389,7 @@ class Segments:
     """None for one gait all the way."""
     bones: Sequence[int]
     """How many bones each arm has."""
+    route: Route
 
     @property
     def changes(self) -> Sequence[GaitTransition]:
@@ -415,7 +419,8 @@ class Segments:
         if gait.standing is not None:
             return gait.standing.place(travel)
         up = rotate(travel.rotations, _UP) if gait.table.on_ground else _UP
-        return travel.positions + gait.height * up, travel.rotations
+        height = gait.height + raised_along(self.route, gait.travel, travel.distance)[:, None]
+        return travel.positions + height * up, travel.rotations
 
     def swimming(self, distance: Floats) -> Floats | None:
         """How far (moments,) the body swims at distances (moments,), 0…1; none for one gait."""

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the body is and which way it faces, over time."""
 
+from .along_route import ValuesAlong
 from .course import (
     Course,
     Line,
@@ -22,19 +23,24 @@ from .gait_changes import (
 )
 from .route import Route, s_bend
 from .travel import (
+    AlongRoute,
     Bearings,
     Travel,
     TravelSettings,
     bearings_of,
     duration,
+    paced_time,
     plan_travel,
+    raised_along,
     strides,
     travel_at,
     unhurried,
+    values_along,
     walked_at,
 )
 
 __all__ = [
+    "AlongRoute",
     "Bearings",
     "Course",
     "GaitTransition",
@@ -43,13 +49,16 @@ __all__ = [
     "SwumLine",
     "Travel",
     "TravelSettings",
+    "ValuesAlong",
     "WalkedLine",
     "Windows",
     "bearings_of",
     "blend_motions",
     "check_transitions",
     "duration",
+    "paced_time",
     "plan_travel",
+    "raised_along",
     "route_in_place",
     "s_bend",
     "slowing",
@@ -59,6 +68,7 @@ __all__ = [
     "travel_at",
     "travel_in_place",
     "unhurried",
+    "values_along",
     "walked_at",
     "way_weights",
     "whole_frames",

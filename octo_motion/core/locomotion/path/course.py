@@ -24,7 +24,16 @@ from ..gait import CYCLE
 from ..rig import lift_to_floor
 from .gait_changes import GaitTransition
 from .route import Route
-from .travel import Bearings, Travel, TravelSettings, stroke_distance, travel_at, walked_at
+from .travel import (
+    AlongRoute,
+    Bearings,
+    Travel,
+    TravelSettings,
+    raised_along,
+    stroke_distance,
+    travel_at,
+    walked_at,
+)
 
 
 class Line(Protocol):
@@ -81,7 +90,8 @@ class SwumLine:
         """World positions (…, 3) and orientations (…, 4)."""
         wanted = np.asarray(distance, dtype=np.float64)
         travel = self.travel(wanted.reshape(-1))
-        positions = travel.positions + np.array([0.0, 0.0, self.height])
+        positions = travel.positions.copy()
+        positions[:, 2] += self.height + raised_along(self.route, self.settings, travel.distance)
         if self.floor is not None:
             over = positions[:, 2] - self.floor.at(travel.distance)[0][:, 2] - self.room
             positions[:, 2] += lift_to_floor(over, self.softness)
@@ -103,7 +113,7 @@ class WalkedLine:
         wanted = np.asarray(distance, dtype=np.float64)
         flat = wanted.reshape(-1)
         positions, rotations = walked_at(self.route, self.settings, self.bearings, flat)
-        positions = positions + np.array([0.0, 0.0, self.height])
+        positions[:, 2] += self.height + raised_along(self.route, self.settings, flat)
         return positions.reshape(*wanted.shape, 3), rotations.reshape(*wanted.shape, 4)
 
 
@@ -183,8 +193,8 @@ def route_in_place(stride: float, cycles: int) -> Route:
 
 
 def travel_in_place(travel: TravelSettings) -> TravelSettings:
-    """The same gait at even speed from the first frame to the last."""
-    return replace(travel, speed="EVEN", ease_in=0.0, ease_out=0.0)
+    """The same gait at even speed from the first frame to the last, everywhere the same."""
+    return replace(travel, speed="EVEN", ease_in=0.0, ease_out=0.0, along=AlongRoute())
 
 
 def whole_frames(frames: float) -> float:

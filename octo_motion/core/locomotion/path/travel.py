@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import acos, atan2, cos, exp, sin, sqrt
 from typing import Final, Literal
 
@@ -30,6 +30,7 @@ from ...rotations import (
 from ...settings import check_settings, setting, share_setting
 from ...smoothing import smooth_step
 from ..gait import CYCLE
+from .along_route import PacedTime, ValuesAlong
 from .route import Route
 
 _FEWEST: Final = 1024
@@ -327,6 +328,34 @@ _tables: Final[ContentCache[Bearings]] = ContentCache(4)
 
 
 @dataclass(frozen=True)
+class AlongRoute:
+    """The settings that differ along a route; none of those that do not."""
+
+    pace: ValuesAlong | None = None
+    """How many times as fast the body is."""
+    lift: ValuesAlong | None = None
+    """As of ``StanceSettings``, …"""
+    hold: ValuesAlong | None = None
+    """… its ``duty``, …"""
+    lean: ValuesAlong | None = None
+    """… likewise."""
+    height: ValuesAlong | None = None
+    """How much higher the body is, metres."""
+
+    def scaled(self, metres: float) -> AlongRoute:
+        """The same, of which heights were given in a unit of so many metres."""
+        if self.height is None:
+            return self
+        values = tuple(metres * each for each in self.height.values)
+        return replace(self, height=replace(self.height, values=values))
+
+
+def values_along(values: ValuesAlong | None, share: ArrayLike, otherwise: float) -> Floats:
+    """Values at shares (…,) of the route; the same everywhere if there are none."""
+    return np.full(np.shape(share), otherwise) if values is None else values.at(share)
+
+
+@dataclass(frozen=True)
 class TravelSettings:
     """How a route is travelled. Angles in radians, lengths in metres."""
 
@@ -428,6 +457,8 @@ class TravelSettings:
         step=5,
     )
     """Within these most of the corner is turned through. The body stays on the route."""
+    along: AlongRoute = field(default_factory=AlongRoute)
+    """What differs along the route."""
 
     def __post_init__(self) -> None:
         check_settings(self)
@@ -549,7 +580,32 @@ def duration(route: Route, settings: TravelSettings, metres_per_second: float) -
             phrase("The speed is {metres_per_second:g} m/s.", metres_per_second=metres_per_second),
             "Give a speed greater than zero.",
         )
-    return route.length / (metres_per_second * _mean_speed(settings))
+    paced = paced_time(route, settings)
+    slower = 1.0 if paced is None else paced.slower
+    return slower * route.length / (metres_per_second * _mean_speed(settings))
+
+
+_PACED: Final = 4096
+"""Steps of the table of a pace that differs along the route."""
+
+
+def paced_time(route: Route, settings: TravelSettings) -> PacedTime | None:
+    """How a route is come through on which the pace differs; none where it does not."""
+    if settings.along.pace is None:
+        return None
+    return PacedTime(settings.along.pace, _share_of_way(route, settings, np.linspace(0, 1, _PACED)))
+
+
+def _share_of_way(route: Route, settings: TravelSettings, parameter: Floats) -> Floats:
+    """Share of the route's length at parameters (…,) that run evenly where the pace is the same."""
+    if settings.speed == "NATURAL":
+        return route.distance_at(parameter) / route.length
+    return parameter
+
+
+def raised_along(route: Route, settings: TravelSettings, distance: Floats) -> Floats:
+    """Metres (…,) by which a body is higher at distances (…,) than elsewhere on its route."""
+    return values_along(settings.along.height, distance / route.length, 0.0)
 
 
 def unhurried(
@@ -586,8 +642,10 @@ def _last_phase(route: Route, settings: TravelSettings) -> float:
 def _progress(route: Route, settings: TravelSettings, times: Floats) -> tuple[Floats, Floats]:
     """Distances and phases ``(frames,)``."""
     share = _eased(times, settings.ease_in, settings.ease_out) / _mean_speed(settings)
-    if settings.speed == "NATURAL":
-        share = route.distance_at(share) / route.length
+    paced = paced_time(route, settings)
+    if paced is not None:
+        share = paced.parameter(share)
+    share = _share_of_way(route, settings, share)
     last = _last_phase(route, settings)
     phase = share * last
     if settings.manner == "SWIM":

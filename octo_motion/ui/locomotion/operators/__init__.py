@@ -15,7 +15,7 @@ from .edits import draw_edits
 from .gait_table import OCTO_MOTION_MT_gait, OCTO_MOTION_MT_gaits, OCTO_MOTION_PT_table
 from .generate import OCTO_MOTION_OT_generate_locomotion
 from .quality import OCTO_MOTION_PT_quality
-from .reaches import OCTO_MOTION_PT_change, OCTO_MOTION_PT_reaches
+from .reaches import OCTO_MOTION_PT_along, OCTO_MOTION_PT_change, OCTO_MOTION_PT_reaches
 from .setups import OCTO_MOTION_PT_setups, draw_setups, shown_name
 
 CLASSES = (
@@ -41,6 +41,7 @@ __all__ = [
     "OCTO_MOTION_OT_add_octopus",
     "OCTO_MOTION_OT_add_route",
     "OCTO_MOTION_OT_generate_locomotion",
+    "OCTO_MOTION_PT_along",
     "OCTO_MOTION_PT_arms",
     "OCTO_MOTION_PT_change",
     "OCTO_MOTION_PT_ground",

@@ -125,7 +125,15 @@ _TURN: Final = 0.008
 _LATER: Final = 0.3
 """Seconds until it is tried again, while Blender renders or a tool of ours runs."""
 _NO_MATTER: Final = RESULTS | {
-    *("contacts", "active_arm", "active_reach", "active_curve", "active_change", "shown_angle"),
+    *(
+        "contacts",
+        "active_arm",
+        "active_reach",
+        "active_curve",
+        "active_change",
+        "shown_angle",
+        "active_along",
+    ),
     *("keys", "key_angle", "key_distance", "key_columns", "tell_overlaps"),
 }
 """Settings that the motion does not depend on while it is live; contacts are looked at otherwise.

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lists of reaches and of places where the gait changes: added, removed, drawn."""
+"""The lists of reaches and of places where the gait or a setting changes: added, removed, drawn."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, Final, cast
 
 import bpy
@@ -18,7 +19,7 @@ from ...declared_settings import free_name
 from ...operator_base import ArmatureOperator, ListKind, ListOperator, RemoveOperator
 from ...panel_base import ArmaturePanel, ItemRows, draw_list
 from ..reading import bones_of
-from ..settings import MODES, locomotion_settings
+from ..settings import MODES, SETTINGS_ALONG, locomotion_settings
 
 _SECONDS_TO_REACH: Final = 1.25
 _SECONDS_TO_HOLD: Final = 2.0
@@ -286,3 +287,97 @@ class OCTO_MOTION_PT_change(ArmaturePanel, bpy.types.Panel):
                 column = layout.column(align=True)
                 for name in ("gait", "position", "length"):
                     column.prop(item, name)
+
+
+# --- Settings along the route ---------------------------------------------------------------------
+
+
+_ALONG: Final = ListKind(
+    settings=locomotion_settings,
+    check=writable_armature,
+    items="along",
+    active="active_along",
+    one="a value",
+    instead="Give it the value of the place before.",
+)
+
+_ALONG_APART: Final = 1e-3
+"""Share of the route by which a new value is off those of its setting at least."""
+
+
+class OCTO_MOTION_UL_along(ItemRows, bpy.types.UIList):
+    """A row for each value: of what, how much, where."""
+
+    def draw_row(self, layout: bpy.types.UILayout, item: Any) -> None:
+        row = layout.row(align=True)
+        row.prop(item, "setting", text="", emboss=False)
+        row.prop(item, item.setting.lower(), text="", emboss=False)
+        row.prop(item, "position", text="", emboss=False)
+
+
+class OCTO_MOTION_OT_along_add(ListOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.along_add"
+    bl_label = "Add Value"
+    bl_description = "Let a setting have a value of its own at a place of the route"
+
+    KIND = _ALONG
+
+    setting: EnumProperty(
+        name="Setting",
+        description="What has a value there",
+        items=SETTINGS_ALONG,
+    )
+    position: FloatProperty(
+        name="Position",
+        description="Where along the route: 0 at its start, 1 at its end",
+        subtype="FACTOR",
+        default=0.5,
+        min=0.0,
+        max=1.0,
+    )
+
+    def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
+        same = [each for each in settings.along if each.setting == self.setting]
+        ground = settings.ground
+        values = {"lift": ground.lift, "hold": ground.duty, "lean": ground.lean}
+        position, taken = self.position, [each.position for each in same]
+        if same:
+            nearest = min(same, key=lambda each: abs(each.position - position))
+            values = {self.setting.lower(): nearest.value}
+        if any(abs(each - position) < _ALONG_APART for each in taken):
+            ends = sorted([0.0, *taken, 1.0])
+            before, after = max(pairwise(ends), key=lambda each: each[1] - each[0])
+            position = 0.5 * (before + after)
+        name = free_name(settings.along, "Value")
+        item = settings.along.add()
+        item.name, item.setting, item.position = name, self.setting, position
+        for each, value in values.items():
+            setattr(item, each, value)
+        settings.active_along = len(settings.along) - 1
+
+
+class OCTO_MOTION_OT_along_remove(RemoveOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.along_remove"
+    bl_label = "Remove Value"
+    bl_description = "Let the places before and after decide here"
+
+    KIND = _ALONG
+
+
+class OCTO_MOTION_PT_along(ArmaturePanel, bpy.types.Panel):
+    bl_label = "Settings Along the Route"
+    bl_parent_id = "OCTO_MOTION_PT_gait"
+    bl_options = {"DEFAULT_CLOSED"}
+    settings_of = staticmethod(locomotion_settings)
+
+    def show(self, layout: Any, settings: Any) -> None:
+        layout.active = settings.travel_on != "NONE"
+        buttons = OCTO_MOTION_OT_along_add, OCTO_MOTION_OT_along_remove
+        draw_list(
+            layout, OCTO_MOTION_UL_along, settings, ("along", "active_along"), buttons, rows=2
+        )
+        item = _ALONG.active_item(settings)
+        if item is not None:
+            column = layout.column(align=True)
+            for name in ("setting", item.setting.lower(), "position"):
+                column.prop(item, name)

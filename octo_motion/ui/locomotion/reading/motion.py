@@ -39,7 +39,7 @@ from ....core.locomotion.motion import (
     Timing,
     Tolerances,
 )
-from ....core.locomotion.path import TravelSettings
+from ....core.locomotion.path import AlongRoute, TravelSettings, ValuesAlong
 from ....core.locomotion.reaching import Reach, Reaching, Timeline, profile_of
 from ....core.locomotion.rig import frames_of_arm
 from ....core.phrases import phrase
@@ -95,7 +95,20 @@ def travel_settings(settings: OCTO_MOTION_PG_locomotion, gait: GaitTable) -> Tra
         manner="WALK" if gait.on_ground else "SWIM",
         stride=gait.stride,
         stroke_phase=gait.power_phase,
+        along=_along(settings),
     )
+
+
+def _along(settings: OCTO_MOTION_PG_locomotion) -> AlongRoute:
+    """What differs along the route; heights are in arm lengths.
+
+    Raises:
+        SettingsError: a setting has two values at one place.
+    """
+    found: dict[str, list[tuple[float, float]]] = {}
+    for item in settings.along:
+        found.setdefault(item.setting.lower(), []).append((item.position, item.value))
+    return AlongRoute(**{name: ValuesAlong.through(pairs) for name, pairs in found.items()})
 
 
 def read_gaits(settings: OCTO_MOTION_PG_locomotion, others: Sequence[str]) -> tuple[GaitJob, ...]:
@@ -132,7 +145,10 @@ def read_timing(settings: OCTO_MOTION_PG_locomotion, render: bpy.types.RenderSet
         speed=settings.speed,
         cycle_time=settings.cycle_time,
         rate=render.fps / render.fps_base,
-        duty=settings.ground.duty,
+        duty=max(
+            (item.value for item in settings.along if item.setting == "HOLD"),
+            default=settings.ground.duty,
+        ),
     )
 
 

@@ -523,6 +523,66 @@ class Reaches:
     active_reach: props.IntProperty(name="Active Reach", options={"HIDDEN"})
 
 
+# --- Settings along the route ---------------------------------------------------------------------
+
+
+SETTINGS_ALONG: Final = (
+    ("PACE", "Pace", "How many times as fast as elsewhere the body is", 0),
+    ("LIFT", "Lift", "How high arms in the air are above the ground at least", 1),
+    ("HOLD", "Hold", "Share of its cycle for which an arm holds on to the ground", 2),
+    ("LEAN", "Lean", "How far the body leans with the ground", 3),
+    ("HEIGHT", "Height", "How much higher than elsewhere the body is", 4),
+)
+
+
+class AlongItem(bpy.types.PropertyGroup):
+    """A value that a setting has at a place of the route."""
+
+    name: bpy.props.StringProperty(name="Name", description="What this value is called in the list")
+    setting: props.EnumProperty(
+        name="Setting",
+        description="What has a value of its own here",
+        items=SETTINGS_ALONG,
+    )
+    position: props.FactorProperty(
+        name="Position",
+        description="Where along the route the value is reached: 0 at its start, 1 at its end. "
+        "From one place to the next it goes over gently; before the first place of a setting and "
+        "after its last it stays",
+        default=0.5,
+        precision=3,
+    )
+    pace: props.FloatProperty(
+        name="Pace",
+        description="How many times as fast the body is, with the rhythm of its arms",
+        default=1.0,
+        min=0.05,
+        max=20.0,
+        soft_min=0.2,
+        soft_max=5.0,
+        step=10,
+    )
+    lift: declared(StanceSettings, "lift")
+    hold: declared(StanceSettings, "duty")
+    lean: declared(StanceSettings, "lean")
+    height: props.FloatProperty(
+        name="Height",
+        description="How much higher the body is, in arm lengths; below 0 it is lower",
+        default=0.0,
+        min=-10.0,
+        max=10.0,
+        soft_min=-0.5,
+        soft_max=0.5,
+        step=5,
+    )
+
+    @property
+    def value(self) -> float:
+        """The one that counts; holds as of ``StanceSettings``, to so many digits."""
+        value = float(getattr(self, self.setting.lower()))
+        return round(value, 6) if self.setting == "HOLD" else value
+
+
 # --- Where along the route the gait changes: ``octo_motion.locomotion.change`` --------------------
 
 

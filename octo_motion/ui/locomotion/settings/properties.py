@@ -33,7 +33,7 @@ from .gait import (
     used,
     weight_property,
 )
-from .lists import ArmList, OCTO_MOTION_PG_change, OCTO_MOTION_PG_ground, Reaches
+from .lists import AlongItem, ArmList, OCTO_MOTION_PG_change, OCTO_MOTION_PG_ground, Reaches
 
 KINDS: Final = (
     ("SLIP", "Slip", "How far an arm slides over the ground that it holds, in arm lengths", 0),
@@ -273,6 +273,12 @@ class RouteSettings:
         soft_min=-10.0,
         soft_max=10.0,
     )
+    along: props.CollectionProperty(
+        name="Along the Route",
+        description="Values that settings have at places of the route, in any order",
+        type=AlongItem,
+    )
+    active_along: props.IntProperty(name="Active Value", options={"HIDDEN"})
 
 
 # --- When the motion is, what it moves, and which keys it gets ------------------------------------

@@ -239,7 +239,7 @@ def test_the_body_stays_on_its_route_and_follows_the_ground() -> None:
     np.testing.assert_allclose(height, height[0], atol=2e-3)
     bumpy = walking("bumps", stretch=True)
     _, centres, _ = bumpy.places(bumpy.times)
-    assert (centres[:, 2] - bumpy.ground.height(centres)).min() > 0.5 * bumpy.line.clearance
+    assert (centres[:, 2] - bumpy.ground.height(centres)).min() > 0.5 * bumpy.line.clearances.min()
 
 
 # --- What the artist wants of single contacts -----------------------------------------------------
