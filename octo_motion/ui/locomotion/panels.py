@@ -174,12 +174,11 @@ class OCTO_MOTION_PT_variation(_Panel, bpy.types.Panel):
 
     def show(self, layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
         layout.prop(settings, "phase_spread")
+        layout.prop(settings, "uneven")
         column = layout.column(align=True)
         column.prop(settings, "variation_min", text="Random Min")
         column.prop(settings, "variation_max", text="Max")
-        column = layout.column()
-        column.active = settings.variation_min != 0.0 or settings.variation_max != 0.0
-        column.prop(settings, "seed")
+        layout.prop(settings, "seed")
 
 
 class OCTO_MOTION_PT_weights(_Panel, bpy.types.Panel):

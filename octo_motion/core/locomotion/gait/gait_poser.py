@@ -58,7 +58,8 @@ from .ccd import (
     weighted_groups,
 )
 from .swim_spread import swim_azimuths, trailing_asides, trailing_beside
-from .table import GaitCurve, GaitTable, gait_angles, variation
+from .table import GaitCurve, GaitTable, gait_angles
+from .variation import unevenness, variation
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,6 +192,19 @@ class GaitSettings:
         soft_high=2.0,
         step=5,
     )
+    uneven: float = setting(
+        "Uneven",
+        "Swimming and in place: how much arms and cycles differ, in when they begin "
+        "and how far they reach and curl. 1 is natural, 0 all alike",
+        default=0.0,
+        offered=1.0,
+        low=0.0,
+        high=2.0,
+        step=10,
+        precision=2,
+        subtype="FACTOR",
+    )
+    """Steps over the ground differ by where their footholds are."""
     variation: tuple[float, float] = (0.0, 0.0)
     """Limits j, k of the random additions to head and pitch [Octopus, §3.4]."""
     seed: int = setting(
@@ -436,20 +450,21 @@ class GaitPoser:
         Angles (frames, arms, links, 3), turns anticlockwise for every arm, and by how much the arms
         steer (frames, arms), radians.
         """
-        settings = self.settings
-        steady = settings.smoothing_cycles
-        angles = gait_angles(
-            settings.gait, phases, self._pairs, smoothing_cycles=steady
-        ) + variation(
-            settings.gait,
+        settings, gait = self.settings, self.settings.gait
+        steady, period = settings.smoothing_cycles, cycle_period or settings.period
+        uneven = settings.uneven if settings.period or not gait.on_ground else 0.0
+        phases, angles = unevenness(phases, uneven, settings.seed, cycle_period=period)
+        angles += gait_angles(gait, phases, self._pairs, smoothing_cycles=steady)
+        angles += variation(
+            gait,
             phases,
             self._pairs,
             settings.variation,
             settings.seed,
-            cycle_period=settings.period if cycle_period is None else cycle_period,
+            cycle_period=period,
             smoothing_cycles=steady,
         )
-        if not settings.gait.on_ground:
+        if not gait.on_ground:
             angles = trailing_beside(angles, self._asides)
         # Towards the goal: by the part of the turn that lies across the arm.
         across = rotate(self._round, np.array([0.0, 1.0, 0.0]))[:, :2]

@@ -10,7 +10,6 @@ twists the arm about the link; it moves no target.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -182,7 +181,7 @@ def gait_angles(
     They are evened out over cycles before and after each moment (:meth:`GaitCurve.rounding`).
     """
     result = np.empty((*phases.shape, LINKS, len(ANGLES)))
-    for pair, columns in _columns_by_curve(table, pairs).items():
+    for pair, columns in columns_by_curve(table, pairs).items():
         curve, own = table.curve(pair), phases[:, columns]
         result[:, columns] = curve.evaluate(own)
         if smoothing_cycles > 0.0:
@@ -193,100 +192,7 @@ def gait_angles(
     return result
 
 
-def variation(
-    table: GaitTable,
-    phases: Floats,
-    pairs: tuple[int, ...],
-    limits: tuple[float, float],
-    seed: int,
-    *,
-    cycle_period: int | Sequence[int] = 0,
-    smoothing_cycles: float = 0.0,
-) -> Floats:
-    """Random additions to the angles: R(j, k) of [Octopus, §3.4].
-
-    One number is drawn for each arm, link, cycle and knot (and for head and pitch apart), uniform
-    in [j, k), and interpolated as the table itself is; the last knot of a cycle is the first of
-    the next, so that the motion stays continuous. Numbers depend on seed, cycle and arm alone,
-    never on which frames are asked for. Bank stays as it is.
-
-    Args:
-        table: the gait, for its knots.
-        phases: (frames, arms) radians.
-        pairs: pair of each arm.
-        limits: j and k, radians.
-        seed: any whole number ≥ 0.
-        cycle_period: cycles after which the numbers come again, 0 for never; or each arm's own.
-        smoothing_cycles: as of :func:`gait_angles`.
-
-    Returns:
-        (frames, arms, links, angles) radians.
-    """
-    low, high = limits
-    result = np.zeros((*phases.shape, LINKS, len(ANGLES)))
-    if phases.size == 0 or (low == 0.0 and high == 0.0):
-        return result
-    cycles = np.floor_divide(phases, CYCLE).astype(np.int64)
-    periods = np.broadcast_to(np.asarray(cycle_period, dtype=np.int64), phases.shape[1:])
-    first = int(cycles.min()) - 1
-    every = np.arange(first, int(cycles.max()) + 3)[:, None]
-    # (cycles, arms) numbers of the cycles whose draws count.
-    numbers = np.where(periods > 0, every % np.maximum(periods, 1), every)
-    for pair, columns in _columns_by_curve(table, pairs).items():
-        curve, own = table.curve(pair), phases[:, columns]
-        knots = len(curve.phases) - 1
-        values = low + (high - low) * _draws(seed, numbers[:, columns], columns, knots)
-        knot, share = curve.locate(own)
-        place = (cycles[:, columns] - first) * knots + knot
-        arms, share = np.arange(len(columns)), share[..., None, None]
-        result[:, columns, :, :2] = (1.0 - share) * values[place, arms]
-        result[:, columns, :, :2] += share * values[place + 1, arms]
-        if smoothing_cycles > 0.0:
-            result[:, columns, :, :2] += _rounded_off(curve, values, own, first, smoothing_cycles)
-    return result
-
-
-def _draws(seed: int, numbers: np.ndarray, arms: np.ndarray, knots: int) -> Floats:
-    """Uniform in [0, 1), one cycle after the other (cycles × knots, arms, links, 2).
-
-    Of arms, by their numbers in the body, the draws of cycles of some numbers (cycles, arms) count.
-    """
-    drawn = {int(each): _draw_cycle(seed, int(each), arms, knots) for each in np.unique(numbers)}
-    values = np.array(
-        [[drawn[each][arm] for arm, each in enumerate(row)] for row in numbers.tolist()]
-    )
-    return np.moveaxis(values, 2, 1).reshape(-1, len(arms), LINKS, 2)
-
-
-def _rounded_off(
-    curve: GaitCurve, values: Floats, phases: Floats, first: int, smoothing_cycles: float
-) -> Floats:
-    """What rounds the corners of random additions off (frames, arms, links, 2).
-
-    Values (cycles × knots, arms, links, 2) are at the curve's knots from the first cycle on, phases
-    (frames, arms) in radians.
-    """
-    knots, arms = len(curve.phases) - 1, np.arange(phases.shape[1])
-    apart = np.tile(np.diff(curve.phases), len(values) // knots)[:-1, None, None, None]
-    corners = np.zeros_like(values)
-    corners[1:-1] = np.diff(np.diff(values, axis=0) / apart, axis=0)
-    rounding = curve.rounding(phases, smoothing_cycles)
-    result = np.zeros((*phases.shape, LINKS, 2))
-    for number in range(knots):
-        nearest = np.rint((phases - curve.phases[number]) / CYCLE).astype(np.int64) - first
-        result += rounding[..., number, None, None] * corners[nearest * knots + number, arms]
-    return result
-
-
-def _draw_cycle(seed: int, cycle: int, arms: np.ndarray, knots: int) -> Floats:
-    """(arms, knots, links, 2) uniform in [0, 1). Each arm has a stream of its own."""
-    # SeedSequence takes no negative numbers; a phase offset can reach back before cycle 0.
-    words = [seed, abs(cycle), int(cycle < 0)]
-    streams = [np.random.default_rng([*words, arm]) for arm in arms.tolist()]
-    return np.stack([stream.random((knots, LINKS, 2)) for stream in streams])
-
-
-def _columns_by_curve(table: GaitTable, pairs: tuple[int, ...]) -> dict[int, np.ndarray]:
+def columns_by_curve(table: GaitTable, pairs: tuple[int, ...]) -> dict[int, np.ndarray]:
     """Arms grouped by the curve that they use."""
     keys = np.array([pair if pair in table.curves else 0 for pair in pairs])
     return {int(key): np.flatnonzero(keys == key) for key in np.unique(keys)}

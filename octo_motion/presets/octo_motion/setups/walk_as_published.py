@@ -14,6 +14,7 @@ settings.softness = 0.0
 settings.give = 0.0
 settings.steady = 0.0
 settings.sway = 0.0
+settings.uneven = 0.0
 settings.speed_mode = "NATURAL"
 settings.ease_in = 0.0
 settings.ease_out = 0.0

@@ -145,6 +145,7 @@ class Movement:
     )
     phase_spread: declared(GaitSettings, "phase_spread")
     turning: declared(GaitSettings, "turning")
+    uneven: declared(GaitSettings, "uneven")
     variation_min: props.AngleProperty(
         name="Variation Min",
         description="Least random addition to the gait's angles, drawn anew for each cycle",

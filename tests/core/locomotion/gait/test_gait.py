@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from octo_motion.core.errors import GaitError
 from octo_motion.core.locomotion.gait import table as gait
+from octo_motion.core.locomotion.gait.variation import variation
 from octo_motion.core.rotations import Floats
 from tests.core import oracle
 
@@ -121,7 +122,7 @@ def varied(
     phases: Floats, seed: int, limits: tuple[float, float] = (-0.2, 0.3), arms: int = 3
 ) -> Floats:
     columns = np.broadcast_to(np.asarray(phases)[:, None], (len(phases), arms))
-    return gait.variation(PRESETS["walk"], columns, (1,) * arms, limits, seed)
+    return variation(PRESETS["walk"], columns, (1,) * arms, limits, seed)
 
 
 def test_no_frames_are_no_variation() -> None:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from octo_motion.core.errors import SettingsError
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.core.locomotion.gait.gait_poser import GaitSettings
+from octo_motion.core.locomotion.gait.variation import variation
 from octo_motion.core.locomotion.ground.walk import (
     GroundedPoses,
     Raise,
@@ -74,7 +75,7 @@ def test_random_additions_have_no_corners_either(seed: int, period: int) -> None
 
     def varied(steady: float) -> Floats:
         limits = (-0.3, 0.4)
-        return gait.variation(
+        return variation(
             table, phases, (1, 2), limits, seed, cycle_period=period, smoothing_cycles=steady
         )
 
@@ -88,9 +89,7 @@ def test_evened_random_additions_come_again_with_their_period(cycle: int) -> Non
     table = gait.gait_presets()["walk"]
     phases = np.linspace(0.0, gait.CYCLE, 50)[:, None] + np.zeros(3)
     found = [
-        gait.variation(
-            table, each, (1, 2, 3), (0.0, 0.2), 5, cycle_period=2, smoothing_cycles=STEADY
-        )
+        variation(table, each, (1, 2, 3), (0.0, 0.2), 5, cycle_period=2, smoothing_cycles=STEADY)
         for each in (phases, phases + 2 * cycle * gait.CYCLE)
     ]
     np.testing.assert_allclose(found[0], found[1], atol=1e-12)

@@ -9,6 +9,7 @@ import pytest
 from octo_motion.core.errors import SettingsError
 from octo_motion.core.locomotion.gait import table as gait
 from octo_motion.core.locomotion.gait.gait_poser import Arm, GaitPoser, GaitSettings
+from octo_motion.core.locomotion.gait.variation import variation
 from octo_motion.core.locomotion.path.course import (
     route_in_place,
     travel_in_place,
@@ -89,9 +90,9 @@ def test_the_seam_is_where_one_puts_it(name: str) -> None:
 def test_without_a_period_random_additions_never_come_again() -> None:
     table = PRESETS["walk"]
     phases = np.array([[0.5], [0.5 + 2.0 * np.pi], [0.5 + 4.0 * np.pi]])
-    free = gait.variation(table, phases, (1,), (-1.0, 1.0), 0)
+    free = variation(table, phases, (1,), (-1.0, 1.0), 0)
     assert not np.allclose(free[0], free[2])
-    bound = gait.variation(table, phases, (1,), (-1.0, 1.0), 0, cycle_period=2)
+    bound = variation(table, phases, (1,), (-1.0, 1.0), 0, cycle_period=2)
     np.testing.assert_allclose(bound[0], bound[2], atol=1e-12)
     assert not np.allclose(bound[0], bound[1])
 
