@@ -125,7 +125,7 @@ def test_a_swim_has_no_slip(small: Any) -> None:
 
 def test_misses_of_a_gait_have_their_frame(small: Any) -> None:
     # So few bones cannot take every shape that the gait asks for, with all its corners.
-    small.octo_motion.locomotion.steady = 0.0
+    small.octo_motion.locomotion.steady = small.octo_motion.locomotion.uneven = 0.0
     shot = prepare(small, bpy.context)
     for _ in shot.compute():
         pass

@@ -112,6 +112,9 @@ _FEW: Final = 100
 """Shapes that are kept: of a few arms at a few frames, which cost as much to start as many."""
 _CYCLE_SAMPLES: Final = 96
 """Phases at which a cycle is looked at as a whole."""
+_RESTING: Final = 0.5
+"""Share of what arms differ by in the water that is left where they rest on the ground in place:
+what lies there is not to creep."""
 _STANDING: Final = 0.3
 """Share of a cycle in which an arm would reach deeper than the floor."""
 _LEAST_DEPTH: Final = 0.1
@@ -452,7 +455,7 @@ class GaitPoser:
         """
         settings, gait = self.settings, self.settings.gait
         steady, period = settings.smoothing_cycles, cycle_period or settings.period
-        uneven = settings.uneven if settings.period or not gait.on_ground else 0.0
+        uneven = settings.uneven * (_RESTING * bool(settings.period) if gait.on_ground else 1.0)
         phases, angles = unevenness(phases, uneven, settings.seed, cycle_period=period)
         angles += gait_angles(gait, phases, self._pairs, smoothing_cycles=steady)
         angles += variation(

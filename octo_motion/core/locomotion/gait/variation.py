@@ -15,7 +15,7 @@ from ...rotations import Floats
 from ...smoothing import least_jerk
 from .table import ANGLES, CYCLE, LINKS, GaitCurve, GaitTable, columns_by_curve
 
-_LATE: Final = 0.02 * CYCLE, 0.006 * CYCLE
+_LATE: Final = 0.02 * CYCLE, 0.003 * CYCLE
 """By how much arms that are naturally uneven are ahead or late at most, radians of phase: always,
 and in a single cycle. More of the latter would make strokes hasty …"""
 _UNLIKE: Final = np.radians([[3.0, 3.0], [4.0, 4.0], [7.0, 7.0]])

@@ -16,7 +16,7 @@ CURRENT: Final = 1
 """Which settings a saved file knows: 1 since the body moves by itself."""
 BEFORE: Final = dict.fromkeys(("surge", "mantle", "siphon", "eyes", "head"), 0.0)
 """What settings were worth before there were any, by name: files of then keep their look …"""
-BEFORE_BESIDE: Final = {"breathing": 0.0}
+BEFORE_BESIDE: Final = {"breathing": 0.0, "uneven": 0.0}
 """… and those beside them."""
 
 
