@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -104,7 +104,13 @@ def sprung(
     """
     whole = 2.0 * np.pi * frequency
     pole = whole * complex(-damping, np.sqrt(1.0 - damping * damping))
-    keep = np.exp(pole * step)
+
+    def kept(seconds: Any) -> Any:
+        # Some C libraries lack exp of complex numbers, which numpy would ask them for.
+        turn = pole.imag * seconds
+        return np.exp(pole.real * seconds) * (np.cos(turn) + 1j * np.sin(turn))
+
+    keep = complex(kept(step))
     last = (keep - 1.0 - pole * step) / (pole * pole * step)
     first = (keep - 1.0) / pole - last
     state = np.empty(values.shape, dtype=np.complex128)
@@ -116,6 +122,6 @@ def sprung(
         reach, factor = 2 * reach, factor * factor
     if cyclic:
         # What is left of a round at its end is there at its start.
-        lap = keep ** (len(values) - 1)
-        state += (keep ** np.arange(len(values)))[:, None] * (state[-1] / (1.0 - lap))
+        left = kept(step * np.arange(len(values)))
+        state += left[:, None] * (state[-1] / (1.0 - left[-1]))
     return whole * whole / pole.imag * state.imag
