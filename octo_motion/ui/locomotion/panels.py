@@ -151,6 +151,7 @@ class OCTO_MOTION_PT_body(_Panel, bpy.types.Panel):
         column = layout.column(align=True)
         for name in ("mantle", "siphon", "eyes", "head"):
             column.prop(body, name)
+        layout.prop(body, "trail")
         row = layout.row()
         row.active = body.eyes > 0.0
         row.prop(body, "look_at")

@@ -44,6 +44,12 @@ class BodySettings:
         "Steady Head",
         "How much of the body's quick turns the head takes back",
     )
+    trail: bool = setting(
+        "Follow-Through",
+        "The outer thirds of free arms trail in the water, swing and settle. What rests on the "
+        "ground stays where it is. Generate takes longer",
+        default=False,
+    )
 
     def __post_init__(self) -> None:
         check_settings(self)

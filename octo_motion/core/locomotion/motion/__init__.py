@@ -14,6 +14,7 @@ from .job import (
     ShownContact,
     Timing,
     Tolerances,
+    Trailing,
 )
 from .pipeline import MISS, Glimpsed, MotionResult, compute, glimpse, pose, way_of
 from .planning import (
@@ -43,6 +44,7 @@ __all__ = [
     "ShownContact",
     "Timing",
     "Tolerances",
+    "Trailing",
     "compute",
     "gait_targets",
     "glimpse",

@@ -9,7 +9,9 @@ from typing import Literal
 
 import numpy as np
 
+from ...follow_through import Limbs
 from ...keyframes import RigChannels
+from ...posing.puppet import Figure
 from ...rotations import Floats
 from ...skeleton import Skeleton
 from ..body import BodySettings, Organs
@@ -142,6 +144,17 @@ class Breathing:
 
 
 @dataclass(frozen=True, eq=False)
+class Trailing:
+    """Outer parts of arms that follow, as bodies."""
+
+    limbs: Limbs
+    figure: Figure
+    """Of these bones, in metres of its own size."""
+    unit: float
+    """Of these metres in one of the world's."""
+
+
+@dataclass(frozen=True, eq=False)
 class BodyJob:
     """What a body does by itself."""
 
@@ -153,6 +166,8 @@ class BodyJob:
     unlike: float = 0.0
     """How much breaths differ, 1 for as much as is natural."""
     seed: int = 0
+    trailing: Trailing | None = None
+    """Outer parts of arms that follow, none where they do not."""
     look_at: Floats | None = None
     """(frames, 3) what the eyes look at, world; none for where the body goes."""
 

@@ -33,9 +33,10 @@ from ..path import plan_travel
 from ..reaching import Carried, Reached, Travelling
 from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
 from .few_keys import Motion, measure_keyed, reduced
-from .job import MotionJob, Tolerances
+from .job import MotionJob, Tolerances, Trailing
 from .planning import MotionPlan, frames_of_arms, plan_motion
 from .segments import SegmentedMotion
+from .trailing import trailed
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +76,9 @@ MISS: Final = TOLD["MISS"]
 
 _PLANNING: Final = 0.1
 """Share of the work that is over when the motion is planned …"""
+_TRAILING: Final = 0.7
+"""Share of the time until the motion is there after which outer parts of arms follow, if they do.
+"""
 _MOVING: Final = 0.4
 """… and when it is there, but not yet its few keys."""
 _EXACT_ANGLE: Final = np.radians(0.5)
@@ -136,7 +140,10 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     at_once = _BONES_AT_ONCE // (_TURNS if plan.job.live else 1)
     step = max(1, at_once // max(len(plan.first.poser.bones), 1))
     posing = _posed(plan, times, step, cyclic=plan.job.in_place)
-    posed = yield from _scaled(posing, 0.0, moving)
+    trailing = plan.job.body.trailing
+    posed = yield from _scaled(posing, 0.0, _TRAILING * moving if trailing else moving)
+    if trailing is not None:
+        yield from _scaled(_trail(plan, trailing, posed), _TRAILING * moving, moving)
     yield moving
     arms, going, keyed, reached = posed.arms, posed.going, posed.keyed, posed.reached
     warnings = [*plan.warnings, *posed.warnings]
@@ -481,6 +488,24 @@ def _take_time(
     for arm in np.flatnonzero(now > _HELPED * then):
         bones = plan.segments.bones_of[arm]
         arms.rotations[:, bones] = before[:, bones]
+
+
+def _trail(plan: MotionPlan, trailing: Trailing, posed: _Posed) -> Steps[None]:
+    """Let outer parts of free arms follow, over the ground."""
+    job, creature, arms, ground = plan.job, plan.job.creature, posed.arms, _underfoot(plan)
+    away = posed.reached.away if posed.reached is not None else np.zeros(arms.late.shape)
+    held = [
+        lying.any(axis=1) | (own > 0.0) for lying, own in zip(arms.in_contact, away.T, strict=True)
+    ]
+    rate, cyclic = plan.stride * job.timing.rate, job.in_place
+    found = trailed(trailing, creature, arms.rotations, posed.going, held, rate=rate, cyclic=cyclic)
+    arms.rotations, free = yield from found
+    if ground is not None:
+        frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
+        course = ArmsOverGround(frames, ground, creature.scale, cyclic=cyclic)
+        poses = Poses(arms.rotations, arms.strains, *posed.going)
+        radii = [creature.scale * each for each in plan.standing[0].radii]
+        arms.rotations = keep_off_ground(course, poses, radii, free)
 
 
 def _opened(plan: MotionPlan, count: int, swimming: Floats | None) -> Opened | None:

@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import bpy
 import numpy as np
 
 from ....blender.animation import standing_of, writable_object
 from ....blender.files import load_gait, sample_weight_curve
-from ....blender.rig import arm_skins, may_stretch, radii_of_skin
+from ....blender.rig import LimbReader, arm_skins, may_stretch, radii_of_skin
 from ....blender.scene import (
     can_be_carried,
     hangs_on,
@@ -23,6 +23,7 @@ from ....blender.scene import (
     read_triangles,
 )
 from ....core.errors import GroundError, SettingsError
+from ....core.follow_through import limbs_of
 from ....core.keyframes import check_bounds
 from ....core.locomotion.body import BodySettings, find_organs
 from ....core.locomotion.gait import GaitSettings, GaitTable
@@ -38,6 +39,7 @@ from ....core.locomotion.motion import (
     GroundJob,
     Timing,
     Tolerances,
+    Trailing,
 )
 from ....core.locomotion.path import AlongRoute, TravelSettings, ValuesAlong
 from ....core.locomotion.reaching import Reach, Reaching, Timeline, profile_of
@@ -173,7 +175,18 @@ def read_body(settings: OCTO_MOTION_PG_locomotion, creature: Creature) -> BodyJo
         organs=organs,
         unlike=1.0,
         seed=settings.seed,
+        trailing=_trailing(settings, creature),
     )
+
+
+def _trailing(settings: OCTO_MOTION_PG_locomotion, creature: Creature) -> Trailing | None:
+    """The outer thirds of the arms as bodies, if they are to follow."""
+    if not settings.body.trail:
+        return None
+    outer = [name for bones in creature.bones for name in bones[-max(len(bones) // 3, 1) :]]
+    armature = cast("bpy.types.Object", settings.id_data)
+    limbs, reader = limbs_of(creature.skeleton, outer), LimbReader(armature)
+    return Trailing(limbs, reader.figure(limbs.bones, limbs.parents), reader.unit)
 
 
 def read_look(

@@ -34,6 +34,7 @@ class OCTO_MOTION_PG_body(bpy.types.PropertyGroup):
     siphon: declared(BodySettings, "siphon")
     eyes: declared(BodySettings, "eyes")
     head: declared(BodySettings, "head")
+    trail: declared(BodySettings, "trail")
     look_at: props.PointerProperty(
         name="Look At",
         description="Object that the eyes look at; without one, they look where the body goes",
