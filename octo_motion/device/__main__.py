@@ -44,6 +44,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     descriptor.add_argument("--table", action="store_true", help="print its reports as tables")
     bridge = add("bridge", help="what Blender starts: simulate, and serve devices")
+    bridge.add_argument("--alone", action="store_true", help="only simulate: no devices")
     hands = add("hands", help="what the bridge starts: the loop at the devices")
     for each in (watch, bridge, hands):
         each.add_argument("--no-hid", action="store_true", help="leave HID devices alone")

@@ -10,21 +10,26 @@ from __future__ import annotations
 
 import logging
 import os
+import platform
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from ..core.errors import DeviceError, OctoMotionError
 from ..core.phrases import phrase
-from ..core.posing.puppet import Pose
+from ..core.posing.balance import carried
+from ..core.posing.puppet import Figure, Pose
+from ..core.posing.session import TickReport
 from ..core.posing.solver import Obstacle, WorldSettings
 from . import messages
 from .calibration import Phase
 from .haptics import Schedule
-from .ipc import ChannelClosedError, Child, MessageChannel, Parent
+from .ipc import ALONE, ChannelClosedError, Child, MessageChannel, Parent
 from .simulation import SimulatedPointer, Simulation
 
 log = logging.getLogger(__name__)
@@ -43,15 +48,18 @@ _SETTLED: Final = 60.0
 class Bridge:
     """What the bridge does, turn by turn."""
 
-    def __init__(self, blender: MessageChannel, hand_arguments: Sequence[str]) -> None:
+    def __init__(self, blender: MessageChannel, hand_arguments: Sequence[str] | None) -> None:
+        """Say things to Blender, and start the process at the devices with these arguments; without
+        any, there are no devices.
+        """
         self._blender = blender
-        self._hand_arguments = tuple(hand_arguments)
+        self._hand_arguments = hand_arguments
         self._hands: Child | None = None
         self._starts = 0
         self._started = 0.0
         self._gave_up = False
         self._greeted = False
-        self._figure: messages.FigureMessage | None = None
+        self._figure: Figure | None = None
         self._world = WorldSettings(step=messages.WorldMessage.step)
         self._obstacles: dict[int, Obstacle | None] = {}
         """By Blender's number; None: gone."""
@@ -77,9 +85,14 @@ class Bridge:
         """
         for message in self._blender.receive():
             self._hear_blender(message)
-        if self._hands is None:
-            self._start_hands()
-        self._hear_hands()
+        if self._hand_arguments is not None:
+            if self._hands is None:
+                self._start_hands(self._hand_arguments)
+            self._hear_hands()
+        elif not self._greeted:
+            self._greeted = True
+            version = platform.python_version()
+            self._blender.send(messages.Hello(os.getpid(), version, "normal"))
         simulation = self.simulation
         if simulation is not None:
             for message in self._heard.values():
@@ -110,11 +123,15 @@ class Bridge:
         simulation = self.simulation
         match message:
             case messages.FigureMessage():
-                message.figure()  # refused here if it is none
-                self._figure, self.simulation = message, None
+                self._take_figure(message)
             case messages.Place():
                 self._placed += 1
                 self._place(message)
+            case messages.Tick():
+                self._tick(message)
+            case messages.Take() | messages.LetGo() | messages.TurnBack():
+                if simulation is not None:
+                    _take_hand(simulation, message)
             case messages.Pins():
                 if simulation is not None:
                     pins = message.pins()
@@ -152,19 +169,34 @@ class Bridge:
     def _place(self, message: messages.Place) -> None:
         if self._figure is None:
             raise messages.MessageError("a pose came before a figure")
+        motion = message.motion(len(self._figure))
         pose = Pose(message.positions, message.orientations)
-        count = len(self._figure.names)
-        if len(pose.positions) != count or len(pose.orientations) != count:
-            raise messages.MessageError("a pose of another figure")
         if self.simulation is not None:
-            self.simulation.place(pose)
+            self.simulation.place(pose, motion)
             return
-        simulation = Simulation(self._figure.figure(), pose, self._world)
+        simulation = Simulation(self._figure, pose, self._world)
+        simulation.session.move_on(motion)
         simulation.session.change_obstacles(self._solid())
         settings = self._remembered.get((messages.Settings, 0))
         if isinstance(settings, messages.Settings):
             simulation.reach = settings.reach
         self.simulation = simulation
+
+    def _take_figure(self, message: messages.FigureMessage) -> None:
+        """Take another figure, or the same one of another material, which goes on as it moves."""
+        before, self._figure = self._figure, message.figure()
+        if before is None or self.simulation is None or not _is_same(before, self._figure):
+            self.simulation = None
+        else:
+            self.simulation.session.change_elements(self._figure.elements)
+
+    def _tick(self, message: messages.Tick) -> None:
+        simulation = self.simulation
+        if simulation is None:
+            raise messages.MessageError("a tick came before a pose")
+        report = simulation.tick(message)
+        self._send_pointers()
+        self._blender.send(_ticked(message.number, self._placed, simulation, report))
 
     def _solid(self) -> tuple[Obstacle, ...]:
         return tuple(each for each in self._obstacles.values() if each is not None)
@@ -174,14 +206,10 @@ class Bridge:
         self._send_to_hands(message)
 
     def _send_to_blender(self) -> None:
+        self._send_pointers()
         simulation = self.simulation
-        # Pointers first: who hears that a limb is held must not have seen yet that it moves.
-        for pointer, message in self._heard.items():
-            hand = simulation.hands.get(pointer) if simulation else None
-            if hand is not None and hand.spring is not None:
-                self._lag += _LAG_SHARE * (time.perf_counter() - message.time - self._lag)
-            self._blender.send(self._pointer(message, hand), droppable=True)
-        if simulation is not None and simulation.session.changed:
+        # Who ticks hears of poses by that.
+        if simulation is not None and not simulation.ticked and simulation.session.changed:
             pose = simulation.session.pose
             # What was left out is sent once Blender reads again: it may be the last for long.
             simulation.session.changed = not self._blender.send(
@@ -191,6 +219,17 @@ class Bridge:
                 ),
                 droppable=True,
             )
+
+    def _send_pointers(self) -> None:
+        """Say where devices are, before any pose that follows: who hears that a limb is held must
+        not have seen yet that it moves.
+        """
+        simulation = self.simulation
+        for pointer, message in self._heard.items():
+            hand = simulation.hands.get(pointer) if simulation else None
+            if hand is not None and hand.spring is not None:
+                self._lag += _LAG_SHARE * (time.perf_counter() - message.time - self._lag)
+            self._blender.send(self._pointer(message, hand), droppable=True)
 
     def _pointer(
         self, message: messages.HandMessage, hand: SimulatedPointer | None
@@ -277,7 +316,7 @@ class Bridge:
             self._hear_device(replace(device, present=False))
         log.warning("The process at the devices ended")
 
-    def _start_hands(self) -> None:
+    def _start_hands(self, arguments: Sequence[str]) -> None:
         """Start the process at the devices, and send it what it needs to know.
 
         Where that fails it is tried again at the next turns, a few times.
@@ -295,7 +334,7 @@ class Bridge:
         self._starts += 1
         self._started = time.monotonic()
         try:
-            self._hands = Child.start(("hands", *self._hand_arguments), Path(sys.executable))
+            self._hands = Child.start(("hands", *arguments), Path(sys.executable))
             for message in self._remembered.values():
                 self._hands.channel.send(message)
         except (DeviceError, ChannelClosedError) as error:
@@ -308,6 +347,47 @@ class Bridge:
             self._hands = None
 
 
+def _is_same(one: Figure, other: Figure) -> bool:
+    """Whether two figures are alike but for the material of their joints."""
+    return all(
+        np.array_equal(getattr(one, each.name), getattr(other, each.name))
+        for each in fields(one)
+        if each.name != "elements"
+    )
+
+
+def _take_hand(
+    simulation: Simulation, message: messages.Take | messages.LetGo | messages.TurnBack
+) -> None:
+    match message:
+        case messages.Take():
+            simulation.take(message)
+        case messages.LetGo():
+            simulation.let_go(message.hand)
+        case messages.TurnBack():
+            simulation.turn_back(message)
+
+
+def _ticked(
+    number: int, placed: int, simulation: Simulation, report: TickReport
+) -> messages.Ticked:
+    """What has come of a tick."""
+    session, world = simulation.session, simulation.world
+    pose, moving, joints = session.pose, world.state().bodies, session.pulled
+    wrenches = np.array([each.wrench for each in simulation.own.values()]).reshape(-1, 6)
+    return messages.Ticked(
+        *(number, placed, simulation.steps, session.time),
+        *(report.simulated, report.steps, report.ratio, report.step, report.resting),
+        *(pose.positions, pose.orientations),
+        *(moving[name] for name in messages.MOTION),
+        loads=world.joint_loads(),
+        pulled=() if joints is None else tuple(map(int, joints)),
+        carried=tuple(carried(session)),
+        hands=tuple(simulation.own),
+        wrenches=wrenches,
+    )
+
+
 def run(hand_arguments: Sequence[str]) -> int:
     """Serve whoever started this process until it is gone; the exit status."""
     # Nothing here has to be tidied up: the lines to both sides end with the process, and whoever
@@ -315,7 +395,7 @@ def run(hand_arguments: Sequence[str]) -> int:
     blender = Parent().line()
     if blender is None:
         return 2
-    bridge = Bridge(blender, hand_arguments)
+    bridge = Bridge(blender, None if ALONE in hand_arguments else hand_arguments)
     # A step that begins a little late is made up for: it is not worth a whole processor's time, as
     # it would be on Windows.
     schedule = Schedule(bridge.period, awake=_AWAKE)

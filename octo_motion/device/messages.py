@@ -15,8 +15,19 @@ from typing import Annotated, ClassVar, Final, NamedTuple, Self
 import numpy as np
 
 from ..core.errors import DeviceError, OctoMotionError
-from ..core.posing.puppet import Elements, Figure
-from ..core.posing.solver import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere, WorldSettings
+from ..core.posing.puppet import Elements, Figure, Pose
+from ..core.posing.session import HandSample
+from ..core.posing.solver import (
+    Box,
+    Capsule,
+    Coupling,
+    Hull,
+    Mesh,
+    Obstacle,
+    Plane,
+    Sphere,
+    WorldSettings,
+)
 from ..core.rotations import Floats
 from ..core.rotations.scalars import IDENTITY, ZERO, Quaternion, Vector, normalized
 from .calibration import Calibration, Phase, Response
@@ -40,7 +51,7 @@ from .codec import (
 )
 from .driver import Axes
 
-VERSION: Final = 5
+VERSION: Final = 6
 MAGIC: Final = b"OMDV"
 HEADER: Final = struct.Struct("<4sHHI")
 MOST_BYTES: Final = 4_000_000
@@ -48,6 +59,10 @@ MOST_BYTES: Final = 4_000_000
 MOST_POINTS: Final = 150_000
 _LIGHTEST, _HEAVIEST, _LARGEST = 1e-15, 1e12, 1e6
 """kg and m of a body: of mites, and of more than ships."""
+_NEARLY: Final = 1e-3
+"""By which the length of an orientation may be off 1."""
+MOST_HANDS: Final = 64
+"""Of Blender's own: mouse, scripts, and what they do on the other side."""
 _APART: Final = 1e9
 """Times as heavy as another body of one figure: solvers tell no more apart."""
 
@@ -155,13 +170,44 @@ class FigureMessage(Message):
         )
 
 
+def _no_points() -> Floats:
+    return np.zeros((0, 3))
+
+
+def _no_turns() -> Floats:
+    return np.zeros((0, 4))
+
+
 @dataclass(frozen=True, eq=False)
 class Place(Message):
-    """Blender to bridge: the puppet is to stand like this, at rest."""
+    """Blender to bridge: the puppet is to stand like this, at rest, or moving as it says."""
 
     KIND = 3
     positions: Annotated[Floats, Table((3,))]
     orientations: Annotated[Floats, Table((4,))]
+    rest: Annotated[Floats, Table((4,))] = field(default_factory=_no_turns)
+    linear: Annotated[Floats, Table((3,))] = field(default_factory=_no_points)
+    angular: Annotated[Floats, Table((3,))] = field(default_factory=_no_points)
+    spin: Annotated[Floats, Table((3,))] = field(default_factory=_no_points)
+
+    def motion(self, count: int) -> dict[str, Floats]:
+        """What of ``WorldSnapshot.bodies`` it says, of so many bodies; nothing of one at rest."""
+        motion = {name: getattr(self, name) for name in MOTION}
+        sizes = {len(each) for each in motion.values()}
+        if {len(self.positions), len(self.orientations)} != {count} or sizes not in ({0}, {count}):
+            raise MessageError("a pose of another figure")
+        _check_turns(self.orientations, self.rest)
+        return {"orientations": self.orientations, **motion} if sizes == {count} else {}
+
+
+MOTION: Final = ("rest", "linear", "angular", "spin")
+"""What a moving puppet has besides its pose, by names of ``WorldSnapshot.bodies``."""
+
+
+def _check_turns(*turns: Floats) -> None:
+    for each in turns:
+        if not (np.abs(np.linalg.norm(each, axis=1) - 1.0) < _NEARLY).all():
+            raise MessageError("an orientation that is none")
 
 
 @dataclass(frozen=True, eq=False)
@@ -372,10 +418,6 @@ class WorldMessage(Message):
         return WorldSettings(**vars(self))
 
 
-def _no_points() -> Floats:
-    return np.zeros((0, 3))
-
-
 @dataclass(frozen=True)
 class _Shape:
     """Which attributes of a kind of obstacle a message carries as size and as points."""
@@ -493,6 +535,112 @@ class CalibrationMessage(Message):
             return Calibration(self.rest, self.least, self.most)
         except DeviceError as error:
             raise MessageError(error.problem) from error
+
+
+# --- A session whose hands are in Blender, too ---------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Tick(Message):
+    """Blender to bridge: so much time has passed, and Blender's own hands are here. Answered with
+    ``Ticked``.
+    """
+
+    KIND = 23
+    number: Annotated[int, U32]
+    seconds: Annotated[float, F64]
+    balanced: Annotated[int, U16]
+    """Bodies, from the first, that are to keep their balance; 0: none."""
+    hands: Annotated[tuple[int, ...], Many(U32, MOST_HANDS)]
+    positions: Annotated[Floats, Table((3,), MOST_HANDS)]
+    orientations: Annotated[Floats, Table((4,), MOST_HANDS)]
+
+    def samples(self) -> dict[int, HandSample]:
+        """Where hands are, by their numbers."""
+        if not len(self.hands) == len(self.positions) == len(self.orientations):
+            raise MessageError("arrays of different lengths")
+        if self.seconds < 0.0:
+            raise MessageError("time does not run backwards")
+        _check_turns(self.orientations)
+        places = zip(self.hands, self.positions, self.orientations, strict=True)
+        return {hand: HandSample(position, turn) for hand, position, turn in places}
+
+
+@dataclass(frozen=True)
+class Take(Message):
+    """Blender to bridge: one more hand of Blender's takes hold of a body."""
+
+    KIND = 24
+    hand: Annotated[int, U32]
+    body: Annotated[int, U16]
+    point: Annotated[Vector, VECTOR]
+    """World."""
+    pull: Annotated[tuple[float, ...], SIX]
+    """As ``Coupling`` has it."""
+
+    def coupling(self) -> Coupling:
+        if min(self.pull) < 0.0:
+            raise MessageError("a hand that pushes away")
+        return Coupling(*self.pull)
+
+
+@dataclass(frozen=True)
+class LetGo(Message):
+    """Blender to bridge: a hand of Blender's lets go."""
+
+    KIND = 25
+    hand: Annotated[int, U32]
+
+
+@dataclass(frozen=True, eq=False)
+class TurnBack(Message):
+    """Blender to bridge: some joints are to be as in a pose, while all else goes on."""
+
+    KIND = 26
+    joints: Annotated[tuple[int, ...], Many(U8, 4096)]
+    """For each body 1 or 0."""
+    positions: Annotated[Floats, Table((3,))]
+    orientations: Annotated[Floats, Table((4,))]
+
+    def pose(self, count: int) -> Pose:
+        if {len(self.joints), len(self.positions), len(self.orientations)} != {count}:
+            raise MessageError("a pose of another figure")
+        _check_turns(self.orientations)
+        return Pose(self.positions, self.orientations)
+
+
+@dataclass(frozen=True, eq=False)
+class Ticked(Message):
+    """Bridge to Blender: what has come of a tick. Blender could go on from it by itself."""
+
+    KIND = 27
+    number: Annotated[int, U32]
+    """The tick's."""
+    placed: Annotated[int, U32]
+    step: Annotated[int, U32]
+    time: Annotated[float, F64]
+    """These as in ``PoseMessage``."""
+    simulated: Annotated[float, F64]
+    steps: Annotated[int, U32]
+    ratio: Annotated[float, F64]
+    length: Annotated[float, F64]
+    resting: Annotated[bool, FLAG]
+    """These as in ``TickReport``."""
+    positions: Annotated[Floats, Table((3,))]
+    orientations: Annotated[Floats, Table((4,))]
+    rest: Annotated[Floats, Table((4,))]
+    linear: Annotated[Floats, Table((3,))]
+    angular: Annotated[Floats, Table((3,))]
+    spin: Annotated[Floats, Table((3,))]
+    loads: Annotated[Floats, Table((3,))]
+    """N·m that joints bear, world."""
+    pulled: Annotated[tuple[int, ...], Many(U8, 4096)]
+    """For each joint whether it was pulled since the last pose it was put into."""
+    carried: Annotated[tuple[int, ...], Many(U16, 4096)]
+    """Bodies that something below carries."""
+    hands: Annotated[tuple[int, ...], Many(U32, MOST_HANDS)]
+    wrenches: Annotated[Floats, Table((6,), MOST_HANDS)]
+    """N and N·m with which these hands of Blender's pull."""
 
 
 # --- The bridge and the loop at the device -------------------------------------------------------

@@ -1,24 +1,38 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The session of posing in the bridge: in time with the clock, held by the hands at devices."""
+"""The session of posing in the bridge: held by hands at devices, in time with the clock, and by
+hands of Blender's, which has time go on by ticks where there is no device.
+"""
 
 from __future__ import annotations
 
 import logging
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 
+from ..core.posing.balance import keep_balance
 from ..core.posing.picking import nearest_body
 from ..core.posing.puppet import Figure, Pose, bodies_with, capsules_in_world, part_of
-from ..core.posing.session import HandSample, Session, StepLength
+from ..core.posing.session import HandSample, Session, StepLength, TickReport
 from ..core.posing.solver import Coupling, HandSpring, World, WorldSettings
 from ..core.rotations import Floats, conjugate, multiply, rotate
 from ..core.rotations.scalars import Vector
-from .messages import DeviceMessage, HandMessage, HeldMessage, Pull, Settings
+from .messages import (
+    MOST_HANDS,
+    DeviceMessage,
+    HandMessage,
+    HeldMessage,
+    MessageError,
+    Pull,
+    Settings,
+    Take,
+    Tick,
+    TurnBack,
+)
 
 log = logging.getLogger(__name__)
 
@@ -87,8 +101,15 @@ class Simulation:
         settings: WorldSettings,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
-        self.session = Session(figure, pose, settings, clock=None)
+        self.session = Session(figure, pose, settings, clock=clock)
         self.hands: dict[int, SimulatedPointer] = {}
+        self.own: dict[int, HandSpring] = {}
+        """What hands of Blender's hold, by their numbers."""
+        self.ticked = False
+        """Whether Blender says what time has passed there."""
+        self._own_way: dict[HandSpring, HandSample] = {}
+        self._own_time = 0.0
+        self._balanced = range(0)
         self.reach = Settings.reach
         self.steps = 0
         self.cost = 0.0
@@ -112,12 +133,18 @@ class Simulation:
 
     # --- What Blender and the devices say --------------------------------------------------------
 
-    def place(self, pose: Pose) -> None:
-        """Put the puppet into a pose, at rest; hands let go."""
+    def place(self, pose: Pose, motion: Mapping[str, Floats] | None = None) -> None:
+        """Put the puppet into a pose, at rest or in motion as ``WorldSnapshot`` has it; hands let
+        go.
+        """
         for hand in self.hands.values():
             hand.refused = hand.message.grab  # let go is let go, until it grabs anew
             self._release(hand)
-        self.session.show(pose)
+        self.own.clear()
+        self._own_way.clear()
+        self.session.adopt(pose)
+        self.session.move_on(motion or {})
+        self.world.pin_here()
 
     def pin(self, pins: dict[int, bool]) -> None:
         """Pin these bodies and no others where they are; those that say so do not turn either."""
@@ -132,6 +159,65 @@ class Simulation:
         """Take other settings; motion goes on."""
         self._length.nominal = settings.step
         self.session.change(**vars(settings))
+
+    # --- Hands of Blender's ----------------------------------------------------------------------
+
+    @property
+    def keeps_time(self) -> bool:
+        """Whether time goes on by the clock: hands at devices do not wait for Blender."""
+        return bool(self.hands) or not self.ticked
+
+    def take(self, message: Take) -> None:
+        """Let one more hand of Blender's take hold.
+
+        Raises:
+            MessageError: there is no such body, or there are too many hands.
+        """
+        if message.body >= len(self.session.figure) or len(self.own) >= MOST_HANDS:
+            raise MessageError("a hand on nothing")
+        coupling = message.coupling()
+        self.let_go(message.hand)
+        point = np.array(message.point)
+        self.own[message.hand] = self.session.grab(message.body, point, coupling=coupling)
+
+    def let_go(self, hand: int) -> None:
+        """A hand of Blender's lets go; one that holds nothing is left alone."""
+        spring = self.own.pop(hand, None)
+        if spring is not None:
+            self._own_way.pop(spring, None)
+            self.session.release(spring)
+
+    def turn_back(self, message: TurnBack) -> None:
+        """Turn some joints back, while all else goes on."""
+        pose = message.pose(len(self.session.figure))
+        self.session.world.turn_back(np.array(message.joints, dtype=bool), pose)
+        self.session.changed = True
+
+    def tick(self, message: Tick) -> TickReport:
+        """Blender's hands are there now; simulate the time that has passed, if nobody else does."""
+        session, self.ticked = self.session, True
+        samples = {
+            self.own[hand]: sample for hand, sample in message.samples().items() if hand in self.own
+        }
+        self._balanced = range(min(message.balanced, len(session.figure)))
+        if self.keeps_time:
+            # They go there within the time that the next tick takes to come.
+            self._own_way, self._own_time = samples, message.seconds
+            return TickReport(0.0, 0, self.pace, self.step_seconds, resting=session.resting)
+        keep_balance(session, self._balanced)
+        report = session.tick(message.seconds, samples)
+        self.steps += report.steps
+        return report
+
+    def _samples(self, simulated: float) -> dict[HandSpring, HandSample]:
+        """Where all hands are that hold something, after so many seconds of their way."""
+        found = {hand.spring: hand.sample() for hand in self.hands.values() if hand.spring}
+        left = self._own_time
+        share = min(1.0, simulated / left) if left > 0.0 else 1.0
+        self._own_time = max(0.0, left - simulated)
+        return found | {each: replace(way, share=share) for each, way in self._own_way.items()}
+
+    # --- Hands at devices ------------------------------------------------------------------------
 
     def hear(
         self, message: HandMessage, device: DeviceMessage | None = None, scale: float = 1.0
@@ -163,7 +249,8 @@ class Simulation:
             hand.refused = message.grab
             return
         # A machine too slow for the measurement goes on without: the body then keeps its velocity.
-        mobility, angular = (0.0, 0.0) if self.cost > _TOO_SLOW else self._mobility(body, point)
+        slow = self.cost > _TOO_SLOW
+        mobility, angular = (0.0, 0.0) if slow else _mobility(self.world, body, point)
         which, pose = bodies_with(session.figure, body), session.pose
         coupling = coupling_for(
             part_of(session.figure, body),
@@ -183,36 +270,6 @@ class Simulation:
             self.session.release(hand.spring)
         hand.spring, hand.grab = None, 0
 
-    def _mobility(self, body: int, point: Floats) -> tuple[float, float]:
-        """How easily a body gives way at a point: 1/kg and 1/(kg·m²), averaged over directions.
-
-        Measured, with everything that holds it: one step with a small push each way, against one
-        without, and time turned back after each.
-        """
-        world = self.world
-        before = world.state()
-        h = world.settings.step
-        size = _PROBE * float(world.figure.masses.sum()) * 9.81
-        lever = point - self._centre(body)
-
-        def after(force: Floats, torque: Floats) -> tuple[Floats, Floats]:
-            kept = world.forces[body].copy()
-            world.forces[body] += np.concatenate([force, torque + np.cross(lever, force)])
-            world.step()
-            velocity = world.velocities()[body]
-            world.forces[body] = kept
-            world.restore(before)
-            return velocity[:3] + np.cross(velocity[3:], lever), velocity[3:]
-
-        still, still_turning = after(np.zeros(3), np.zeros(3))
-        gives = turns = 0.0
-        for axis in np.eye(3):
-            moved, _ = after(size * axis, np.zeros(3))
-            _, turned = after(np.zeros(3), size * axis)
-            gives += float((moved - still) @ axis)
-            turns += float((turned - still_turning) @ axis)
-        return max(0.0, gives) / (3.0 * size * h), max(0.0, turns) / (3.0 * size * h)
-
     # --- Time ------------------------------------------------------------------------------------
 
     def step(self, now: float) -> None:
@@ -230,6 +287,9 @@ class Simulation:
                 hand.refused = hand.grab  # let go is let go, until it grabs anew
                 self._release(hand)
         passed, self._now = now - self._now, now
+        if not self.keeps_time:
+            return
+        keep_balance(self.session, self._balanced)
         if self.session.resting:
             return
         h = self.step_seconds
@@ -242,7 +302,7 @@ class Simulation:
         before = self._clock()
         self.session.advance(
             count,
-            {hand.spring: hand.sample() for hand in self.hands.values() if hand.spring},
+            self._samples(simulated),
             share=simulated / passed if late else 1.0,
         )
         self.steps += count
@@ -285,7 +345,7 @@ class Simulation:
 
     def worked(self, seconds: float) -> None:
         """Lengthen steps if whole turns, messages and all, take too long, or shorten them again."""
-        if not self.session.resting:
+        if self.keeps_time and not self.session.resting:
             step = self.step_seconds
             self.session.change(step=self._length.after(seconds, step, step))
 
@@ -309,7 +369,7 @@ class Simulation:
             mobility=pace * pace * hand.pull.mobility,
             angular_mobility=pace * pace * hand.pull.angular_mobility,
         )
-        at_point = velocity[:3] + np.cross(velocity[3:], place - self._centre(spring.body))
+        at_point = velocity[:3] + np.cross(velocity[3:], place - _centre(self.world, spring.body))
         # How a hand would be turned that held it without lag.
         turn = multiply(self.session.pose.orientations[spring.body], conjugate(spring.grip))
         w, x, y, z = map(float, turn)
@@ -319,11 +379,41 @@ class Simulation:
             *(_tuple(spring.wrench[:3]), _tuple(spring.wrench[3:])),
         )
 
-    def _centre(self, body: int) -> Floats:
-        """(3,) the centre of mass of a body, world."""
-        pose = self.session.pose
-        centre = self.session.figure.centres[body]
-        return pose.positions[body] + rotate(pose.orientations[body], centre)
+
+def _mobility(world: World, body: int, point: Floats) -> tuple[float, float]:
+    """How easily a body gives way at a point: 1/kg and 1/(kg·m²), averaged over directions.
+
+    Measured, with everything that holds it: one step with a small push each way, against one
+    without, and time turned back after each.
+    """
+    before = world.state()
+    h = world.settings.step
+    size = _PROBE * float(world.figure.masses.sum()) * 9.81
+    lever = point - _centre(world, body)
+
+    def after(force: Floats, torque: Floats) -> tuple[Floats, Floats]:
+        kept = world.forces[body].copy()
+        world.forces[body] += np.concatenate([force, torque + np.cross(lever, force)])
+        world.step()
+        velocity = world.velocities()[body]
+        world.forces[body] = kept
+        world.restore(before)
+        return velocity[:3] + np.cross(velocity[3:], lever), velocity[3:]
+
+    still, still_turning = after(np.zeros(3), np.zeros(3))
+    gives = turns = 0.0
+    for axis in np.eye(3):
+        moved, _ = after(size * axis, np.zeros(3))
+        _, turned = after(np.zeros(3), size * axis)
+        gives += float((moved - still) @ axis)
+        turns += float((turned - still_turning) @ axis)
+    return max(0.0, gives) / (3.0 * size * h), max(0.0, turns) / (3.0 * size * h)
+
+
+def _centre(world: World, body: int) -> Floats:
+    """(3,) the centre of mass of a body, world."""
+    pose = world.pose()
+    return pose.positions[body] + rotate(pose.orientations[body], world.figure.centres[body])
 
 
 def coupling_for(

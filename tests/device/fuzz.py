@@ -57,6 +57,14 @@ def _message(data: bytes) -> None:
             message.calibration()
         case say.WorldMessage():
             message.settings()
+        case say.Place():
+            message.motion(len(message.positions))
+        case say.TurnBack():
+            message.pose(len(message.joints))
+        case say.Tick():
+            message.samples()
+        case say.Take():
+            message.coupling()
 
 
 def _descriptor(data: bytes) -> None:

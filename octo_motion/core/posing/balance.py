@@ -7,6 +7,7 @@ outline of these places has to hold the centre of mass.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,12 +15,17 @@ import numpy as np
 
 from ..rotations import Floats, rotate
 from .puppet import Figure, Pose, capsules_in_world
+from .session import Session
 
 _FREQUENCY: Final = 2.5
 """Hz at which the centre of mass swings to where it belongs: slower than any hand."""
 _STRONGEST: Final = 1.0
 """Of the figure's weight: the push that keeps it."""
 _GRAVITY: Final = 9.81
+_UPWARDS: Final = 0.5
+"""Of a contact's normal: what leans more does not carry."""
+_STILL: Final = 0.05
+"""m/s²: a push that is less wakes nobody."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +75,41 @@ def balance_of(figure: Figure, pose: Pose, bodies: list[int], touched: list[int]
     spread = (ends[:, None] + radii[:, None, None] * ring).reshape(-1, 3)
     spread[:, 2] = float((ends[:, 2] - radii).min())
     return Balance(centre, spread[_outline(spread[:, :2])])
+
+
+def carried(session: Session) -> list[int]:
+    """Bodies that something below has carried in a session's last step."""
+    contacts = session.world.contacts
+    if contacts is None or not len(contacts):
+        return []
+    below = (contacts.normals[:, 2] > _UPWARDS) & (contacts.others < 0)
+    return sorted(set(contacts.bodies[below].tolist()))
+
+
+def balance_now(session: Session, own: range, carriers: Sequence[int]) -> Balance:
+    """Of a session's figure, whose bodies are ``own``: it stands on what is pinned, and on what is
+    carried.
+    """
+    parents = session.figure.parents
+    pinned = {body for body in session.pins if parents[body] >= 0}
+    touched = pinned.union(carriers).intersection(own)
+    return balance_of(session.figure, session.pose, list(own), sorted(touched))
+
+
+def keep_balance(session: Session, own: range) -> None:
+    """Push the root of a session's first figure so that the figure keeps its balance; of no bodies,
+    push no more.
+    """
+    world, force = session.world, np.zeros(3)
+    masses = session.figure.masses[own.start : own.stop]
+    if own and own[0] not in session.pins:
+        velocity = masses @ world.velocities()[own.start : own.stop, :3] / masses.sum()
+        now = balance_now(session, own, carried(session))
+        force = righting_force(now, velocity, float(masses.sum()))
+    if not np.array_equal(force, world.forces[own.start, :3]):
+        world.forces[own.start, :3] = force
+        if np.linalg.norm(force) > _STILL * float(masses.sum()):
+            session.wake()
 
 
 def righting_force(balance: Balance, velocity: Floats, mass: float) -> Floats:

@@ -87,6 +87,8 @@ class HandSample:
     """(4,) how the hand is turned, seen as when it grabbed."""
     velocity: Floats = field(default_factory=lambda: np.zeros(6))
     """(6,) linear and angular."""
+    share: float = 1.0
+    """Of the way there that it goes with the next steps."""
 
 
 @dataclass(frozen=True)
@@ -154,6 +156,20 @@ def hand_for(figure: Figure, strength: float = 1.0) -> Coupling:
     return Coupling.for_figure(figure, GENTLE * max(strength, 1.0))
 
 
+def lead(hands: Mapping[HandSpring, HandSample]) -> None:
+    """Let hands be where they are now, without a step."""
+    for spring, hand in hands.items():
+        _Sweep.towards(spring, hand, 1.0, 0.0).pull(1.0)
+
+
+def _coupling_at(session: Session, body: int) -> Coupling:
+    figure = session.figure
+    if not figure.owners or figure.owners[body] == figure.owners[0]:
+        return session.coupling
+    # Another figure, or a thing, is held as is right for its own weight.
+    return hand_for(part_of(figure, body))
+
+
 class Session:
     """A figure in a world, and hands that hold it; the settings' step is the nominal one.
 
@@ -180,10 +196,10 @@ class Session:
         self._start = self.world.pose()
         self._reference = self._start
         self._touched: set[int] = set()
-        # Joints that were pulled since the reference; None where that may be all of them.
-        self._pulled: Flags | None = np.zeros(len(figure), dtype=bool)
+        self.pulled: Flags | None = np.zeros(len(figure), dtype=bool)
+        """Joints that were pulled since the figure was put there; None: it may be all of them."""
         # Of a figure that nobody has held yet, those that something touches.
-        self._yielding = self._pulled
+        self._yielding = self.pulled
         self._clock = clock
         self._length = StepLength(settings.step, COARSEST, BUSY, 0.4, 0.2)
         self._left = 0.0
@@ -228,16 +244,9 @@ class Session:
         """Take hold of a body with one more hand, see ``World.grab``."""
         self.remember()
         self._note_touched()
-        spring = self.world.grab(body, point, orientation, coupling or self._coupling_at(body))
+        spring = self.world.grab(body, point, orientation, coupling or _coupling_at(self, body))
         self.wake()
         return spring
-
-    def _coupling_at(self, body: int) -> Coupling:
-        owners = self.figure.owners
-        if not owners or owners[body] == owners[0]:
-            return self.coupling
-        # Another figure, or a thing, is held as is right for its own weight.
-        return hand_for(part_of(self.figure, body))
 
     def release(self, spring: HandSpring | None = None) -> None:
         """Let one hand go, or all of them."""
@@ -293,7 +302,9 @@ class Session:
         """
         world, passed = self.world, count * self.world.settings.step
         sweeps = [
-            _Sweep.towards(spring, hand, share, passed) for spring, hand in hands.items() if count
+            _Sweep.towards(spring, hand, share * hand.share, passed)
+            for spring, hand in hands.items()
+            if count
         ]
         for number in range(1, count + 1):
             for sweep in sweeps:
@@ -321,7 +332,7 @@ class Session:
             joints = joints | world.pulled()
         world.let_yield(joints)
         self._yielding = joints
-        self._pulled = None if joints is None or self._pulled is None else self._pulled | joints
+        self.pulled = None if joints is None or self.pulled is None else self.pulled | joints
 
     # --- What can be changed on the way ----------------------------------------------------------
 
@@ -368,15 +379,24 @@ class Session:
 
         Of a figure in a hand that is what nobody pulls; where its weight bends it, nothing.
         """
-        if self._pulled is None:
+        if self.pulled is None:
             return
-        joints = ~self._pulled
+        joints = ~self.pulled
         if not self.world.grabs:
             joints[:] = True
             joints[self.touched()] = False
         # Roots are where they are.
         joints[np.array(self.figure.parents) < 0] = False
-        self.world.turn_back(joints, self._reference)
+        self._turn_back(joints, self._reference)
+
+    def _turn_back(self, joints: Flags, pose: Pose) -> None:
+        self.world.turn_back(joints, pose)
+        self.changed = True
+
+    def move_on(self, motion: Mapping[str, Floats]) -> None:
+        """Take over where bodies are and how they move, as ``WorldSnapshot`` has them."""
+        now = self.world.state()
+        self.world.restore(replace(now, bodies={**now.bodies, **motion}))
         self.changed = True
 
     def adopt(self, pose: Pose) -> None:
@@ -399,14 +419,14 @@ class Session:
                 self.world.pin(body, firm=firm)
         self.show(pose)
         self._reference = self.world.pose()
-        self._pulled = np.zeros(len(self.figure), dtype=bool)
+        self.pulled = np.zeros(len(self.figure), dtype=bool)
 
     def show(self, pose: Pose) -> None:
         """Stand in a pose at rest, pins where bodies are then; hands go on holding."""
         self.world.set_pose(pose)
         self.world.pin_here()
         # It may be bent anywhere.
-        self._pulled = None
+        self.pulled = None
         self.wake()
 
     def restore(self) -> None:
@@ -427,7 +447,9 @@ class Session:
         if not taken:
             return False
         kept.append(self.world.state())
-        self.world.restore(taken.pop())
+        # Contacts of another moment are no beginning: as in a pose that is given.
+        self.world.set_pose(self.pose)
+        self.move_on(taken.pop().bodies)
         self.world.pin_here()
         self.wake()
         return True
@@ -440,7 +462,7 @@ class Session:
 
     def _note_touched(self) -> None:
         turned = turned_bodies(self.figure, self._reference, self.pose)
-        if self._pulled is not None:
+        if self.pulled is not None:
             # Others give way to nothing: what they are bent by now, they spring back.
-            turned = [body for body in turned if self._pulled[body]]
+            turned = [body for body in turned if self.pulled[body]]
         self._touched |= set(turned)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender's end of the bridge: start it, talk to it, notice when it is gone.
 
-Nothing here waits, but for the start. Call ``poll`` often, at each tick of a modal operator or a
+Nothing here waits, but for ``start``. Call ``poll`` often, at each tick of a modal operator or a
 timer; it takes microseconds when nothing has come.
 """
 
@@ -21,12 +21,16 @@ from ...core.posing.solver import Obstacle
 from .. import messages
 from ..calibration import Phase
 from ..messages import CalibrationMessage, DeviceMessage, Notice, PointerMessage
-from .process import ChannelClosedError, Child
+from .process import ChannelClosedError, Child, Starting
 
 _MOST_WAITING: Final = 100_000_000
 """Bytes: a scene's meshes are sent at one go, two dozen of the largest."""
 _SILENT: Final = 5.0
 """s; it speaks once a second at least."""
+
+
+ALONE: Final = "--alone"
+"""Of a bridge that only simulates, without devices."""
 
 
 class ClientState(Enum):
@@ -64,9 +68,12 @@ class Client:
     """``time.monotonic`` of the last message."""
     log_file: Path | None = None
     """Where the bridge's messages go; without one, to our console."""
+    ticked: messages.Ticked | None = None
+    """What has come of the newest tick, to be cleared by the caller."""
     _placed: int = 0
     """How often the puppet was put into a pose."""
     _child: Child | None = None
+    _starting: Starting | None = None
     _arguments: tuple[str, ...] = ()
     _python: Path | None = None
     _figure: tuple[Figure, Pose] | None = None
@@ -81,15 +88,40 @@ class Client:
         Raises:
             DeviceError: it cannot be started.
         """
+        self._begin(arguments, python)
+        self._take(Child.start(("bridge", *arguments), python, self.log_file))
+
+    def start_soon(self, arguments: Sequence[str] = (), python: Path | None = None) -> None:
+        """Start the bridge without waiting for it; it is there once ``poll`` finds that it answers.
+
+        One that cannot be started is lost.
+        """
+        self._begin(arguments, python)
+        self._starting = Starting(("bridge", *arguments), python, self.log_file)
+
+    def _begin(self, arguments: Sequence[str], python: Path | None) -> None:
         self.stop()
         self._arguments, self._python = tuple(arguments), python
         self._forget_devices()
-        self.times = self.hello = None
+        self.times = self.hello = self.ticked = None
         self._placed = 0
-        self._child = Child.start(("bridge", *arguments), python, self.log_file)
-        self._child.channel.most_waiting = _MOST_WAITING
+
+    def _take(self, child: Child) -> None:
+        self._child = child
+        child.channel.most_waiting = _MOST_WAITING
         self.state = ClientState.RUNNING
         self.heard = time.monotonic()
+
+    def _look(self) -> None:
+        """See what has become of a bridge that is being started."""
+        starting = self._starting
+        if starting is not None and starting.trouble is not None:
+            trouble, self._starting = starting.trouble, None
+            self.state = ClientState.LOST
+            self.notices.append(Notice(trouble.problem, trouble.remedy))
+        elif starting is not None and starting.child is not None:
+            self._starting = None
+            self._take(starting.child)
 
     def restart(self) -> None:
         """Start a lost bridge again, with the figure it had, in its last pose.
@@ -109,6 +141,9 @@ class Client:
 
     def stop(self) -> None:
         """End the bridge, if there is one; hands let go at once."""
+        starting, self._starting = self._starting, None
+        if starting is not None:
+            starting.drop()
         child, self._child = self._child, None
         if child is not None:
             if child.running:
@@ -121,7 +156,9 @@ class Client:
         """Say something to the bridge; without one, nothing happens."""
         if self._child is None:
             return
-        self._placed += isinstance(message, messages.Place)
+        if isinstance(message, messages.Place):
+            self._placed += 1
+            self.steps = 0
         try:
             self._child.channel.send(message)
         except ChannelClosedError:
@@ -153,6 +190,7 @@ class Client:
     def poll(self) -> list[messages.Button]:
         """Take in all that the bridge has said; buttons that were pressed or let go, in order."""
         buttons: list[messages.Button] = []
+        self._look()
         try:
             came = self._child.channel.receive() if self._child else []
         except ChannelClosedError:
@@ -162,6 +200,10 @@ class Client:
             self.heard = time.monotonic()
             match message:
                 case messages.PoseMessage() if message.placed == self._placed:
+                    self.pose = Pose(message.positions, message.orientations)
+                    self.steps = message.step
+                case messages.Ticked() if message.placed == self._placed:
+                    self.ticked = message
                     self.pose = Pose(message.positions, message.orientations)
                     self.steps = message.step
                 case PointerMessage():
@@ -216,6 +258,11 @@ class Client:
                 "The pose and all keys are kept; start it again to go on.",
             )
         )
+
+    @property
+    def bridge(self) -> object:
+        """The bridge that runs, another one each time it is started; None where there is none."""
+        return self._child
 
     @property
     def silent(self) -> bool:

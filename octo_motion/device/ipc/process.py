@@ -342,6 +342,43 @@ class Child:
         _end(self._process, seconds)
 
 
+class Starting:
+    """A process of ours that is being started by a thread: nobody waits for it."""
+
+    def __init__(
+        self, arguments: Sequence[str], python: Path | None, log_file: Path | None
+    ) -> None:
+        """As ``Child.start``."""
+        self.child: Child | None = None
+        """Once it answers."""
+        self.trouble: DeviceError | None = None
+        self._lock = threading.Lock()
+        self._dropped = False
+        self._thread = threading.Thread(
+            target=self._start, args=(arguments, python, log_file), daemon=True
+        )
+        self._thread.start()
+
+    def _start(self, arguments: Sequence[str], python: Path | None, log_file: Path | None) -> None:
+        try:
+            child = Child.start(arguments, python, log_file)
+        except DeviceError as error:
+            self.trouble = error
+            return
+        with self._lock:
+            if not self._dropped:
+                self.child = child
+                return
+        child.stop()
+
+    def drop(self) -> None:
+        """Nobody wants it any more: end it, now or as soon as it answers."""
+        with self._lock:
+            self._dropped = True
+        if self.child is not None:
+            self.child.stop()
+
+
 def runtime_folder(python: Path) -> Path | None:
     """Where Blender for Windows has Microsoft's C runtime: its Python alone does not find it."""
     for folder in python.parents[:5]:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What helps an artist while a figure is posed: its other side goes along, it keeps its balance,
-and where it was is remembered to be drawn.
+"""What helps an artist while a figure is posed: its other side goes along, and where it was is
+remembered to be drawn.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import bpy
 import numpy as np
 
 from ...blender.rig import Puppet
-from ...core.posing.balance import Balance, balance_of, righting_force
 from ...core.posing.puppet import Pose
 from ...core.posing.session import HandSample, Session
 from ...core.posing.solver import HandSpring
@@ -105,42 +104,3 @@ class Traces:
         """
         wanted = [frame + way * step * number for number in range(1, count + 1) for way in (-1, 1)]
         return [(each > frame, self.poses[each]) for each in wanted if each in self.poses]
-
-
-class Balancing:
-    """The figure's balance, looked at or kept."""
-
-    def __init__(self, session: Session, own: range) -> None:
-        self._session = session
-        self._own = list(own)
-
-    def now(self) -> Balance:
-        """As it is now: it stands on what is pinned, and on what it touches."""
-        session = self._session
-        roots = {body for body in self._own if session.figure.parents[body] < 0}
-        touched = {body for body in session.pins if body in self._own} - roots
-        contacts = session.world.contacts
-        if contacts is not None and len(contacts):
-            below = (contacts.normals[:, 2] > _UPWARDS) & (contacts.others < 0)
-            touched |= {body for body in contacts.bodies[below].tolist() if body in self._own}
-        return balance_of(session.figure, session.pose, self._own, sorted(touched))
-
-    def keep(self, *, kept: bool) -> None:
-        """Push the figure's root, or push no more."""
-        world = self._session.world
-        root = self._own[0]
-        force = np.zeros(3)
-        if kept and root not in self._session.pins:
-            masses = self._session.figure.masses[self._own]
-            velocity = masses @ world.velocities()[self._own, :3] / masses.sum()
-            force = righting_force(self.now(), velocity, float(masses.sum()))
-        if not np.array_equal(force, world.forces[root, :3]):
-            world.forces[root, :3] = force
-            if np.linalg.norm(force) > _STILL * float(self._session.figure.masses.sum()):
-                self._session.wake()
-
-
-_UPWARDS: Final = 0.5
-"""Of a contact's normal: what leans more does not carry."""
-_STILL: Final = 0.05
-"""m/s²: a push that is less wakes nobody."""

@@ -110,6 +110,9 @@ class PoseControls:
         return HELP if self.session.measuring is None else MEASURING
 
     def tick(self, seconds: float) -> None:
+        core = self.session.core
+        if core.said:
+            self.message, core.said = core.said, ""
         if self.session.measuring is not None:
             self.session.tick(seconds, self.hand)
             return

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
-from typing import Any, Final
+from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -18,8 +18,6 @@ from ...blender.versions import ndof_sensitivities
 from ...core.errors import SettingsError, WriteError
 from ...core.phrases import phrase
 from ...core.posing.picking import nearest_body
-from ...core.posing.puppet import Pose
-from ...core.posing.solver import Obstacle
 from ...core.rotations import IDENTITY, Floats, from_matrix, from_rotation_vector, multiply
 from ...device.calibration import NONE, Calibration
 from ...device.driver import Kind
@@ -36,6 +34,7 @@ from ...device.messages import (
     WorldMessage,
 )
 from ...device.messages import Settings as DeviceSettings
+from .controls import PoseControls
 from .puppet_session import PuppetSession
 
 _WIDTH: Final = 0.25
@@ -86,18 +85,30 @@ class HandsBase:
     off.
     """
 
-    hand: Floats | None = None
-    """No mouse draws an arrow."""
-
-    def __init__(self, session: PuppetSession, client: Client) -> None:
+    def __init__(self, session: PuppetSession, client: Client, clock: Callable[[], float]) -> None:
         self.session = session
         self.client = client
+        self.mouse = PoseControls(session)
+        """One hand more."""
+        self._clock = clock
+        self._last = clock()
         self.message = ""
         """The last thing worth telling."""
 
     @property
+    def hand(self) -> Floats | None:
+        """(3,) where the mouse's hand is while it holds, world."""
+        return self.mouse.hand
+
+    def passed(self) -> float:
+        """Seconds since this was asked."""
+        now = self._clock()
+        seconds, self._last = now - self._last, now
+        return seconds
+
+    @property
     def hover(self) -> int | None:
-        """The limb that is held, or the first of several."""
+        """The limb that is held, or the first of several; else the one under the mouse."""
         raise NotImplementedError
 
     @property
@@ -196,19 +207,20 @@ class Calibrations:
 class DeviceHands(HandsBase):
     """Hands at devices: the bridge, started, simulates; the session steps no more by itself."""
 
-    def __init__(self, session: PuppetSession, client: Client, settings: DeviceSettings) -> None:
-        super().__init__(session, client)
+    def __init__(
+        self,
+        session: PuppetSession,
+        client: Client,
+        settings: DeviceSettings,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        super().__init__(session, client, clock)
         self._asked: float | None = None
-        self._figure: Any = None
-        self._world: Any = None
-        self._obstacles: tuple[Obstacle, ...] = ()
-        self._pins: dict[int, bool] = {}
         self._settings: DeviceSettings | None = None
         self._spaces: dict[int, Workspace] = {}
-        self._ours: Pose = session.core.pose
-        self._held: set[int] = set()
         self.calibrations = Calibrations(client)
-        self._send_changes(settings)
+        session.core.share(client, WorldMessage.step)
+        self._send(settings)
 
     def restart(self) -> None:
         """Start the bridge again, and tell it all that the one before it knew.
@@ -218,20 +230,23 @@ class DeviceHands(HandsBase):
         """
         self.client.restart()
         settings, self._settings = self._settings, None
-        self._world, self._obstacles = None, ()
         self.calibrations.sent = {}
-        self._held.clear()
         self._asked = None
         self.recentre()
         if settings is not None:
-            self._send_changes(settings)
+            self._send(settings)
 
     # --- What is there --------------------------------------------------------------------------
 
     @property
     def hover(self) -> int | None:
         held = (each.body for each in self.client.pointers.values() if each.body >= 0)
-        return next(held, None)
+        return next(held, self.mouse.hover)
+
+    @property
+    def holding(self) -> bool:
+        """Whether a hand at a device holds a limb."""
+        return any(each.body >= 0 for each in self.client.pointers.values())
 
     def shown(self) -> list[ShownPointer]:
         return [self._shown(each) for each in self.client.pointers.values()]
@@ -261,27 +276,6 @@ class DeviceHands(HandsBase):
         self.client.send(Grab(number, grab=not held))
         if not held:
             self._asked = time.monotonic()
-
-    def restore(self) -> None:
-        super().restore()
-        self._let_go()
-
-    def step_back(self) -> bool:
-        return self._stepped(super().step_back())
-
-    def step_forward(self) -> bool:
-        return self._stepped(super().step_forward())
-
-    def _stepped(self, done: bool) -> bool:  # noqa: FBT001 - what has come of the step
-        if done:
-            self._let_go()
-        return done
-
-    def _let_go(self) -> None:
-        """The session has taken the puppet out of the hands."""
-        self._give(self.session.core.pose)
-        # A hand that still holds will let go: that is no grab of its own.
-        self._held = set(self.client.pointers)
 
     def recentre(self) -> None:
         """Bring all pointers to the middle of the view."""
@@ -315,17 +309,11 @@ class DeviceHands(HandsBase):
         Raises:
             RigError: the armature is gone, changed or in edit mode.
         """
-        buttons = self.client.poll()
         core = self.session.core
-        self._note_grabs()
-        if not _same(core.pose, self._ours):
-            # A change of frame, or a script, has posed the armature: that counts.
-            self._give(core.pose)
-        elif self.client.pose is not None and self.client.steps > 0:
-            core.show(self.client.pose)
-            self._ours = core.pose
-        self.session.tick(0.0)
-        self._send_changes(settings)
+        self.mouse.tick(self.passed())
+        buttons, core.buttons = core.buttons, []
+        if settings != self._settings:
+            self._send(settings)
         for number, device in self.calibrations.keep_learned():
             self.message = phrase("Calibrated: {device}", device=device.name)
             self._fit(number, device)
@@ -342,63 +330,14 @@ class DeviceHands(HandsBase):
             self.message = NOTHING_NEAR
         return buttons
 
-    def _note_grabs(self) -> None:
-        """Before the first pose that follows from a grab: that is what a step back leads to."""
-        held = {number for number, each in self.client.pointers.items() if each.body >= 0}
-        if held - self._held:
-            self.session.core.remember()
-        self._held = held
-
     def _fit(self, number: int, device: DeviceMessage) -> None:
         """Lay the room of a device anew, whose own is another one now."""
         if device.kind == Kind.POSE:
             self._spaces.pop(number, None)
 
-    def _give(self, pose: Pose) -> None:
-        self._ours = pose
-        self.client.send_pose(pose)
-        self.client.steps = 0
-
-    def _send_changes(self, settings: DeviceSettings) -> None:
-        session = self.session
-        world = session.core.world
-        wanted = WorldMessage(
-            gravity=world.settings.gravity,
-            self_collision=world.settings.self_collision,
-            friction=world.settings.friction,
-            drag=world.settings.drag,
-        )
-        if wanted != self._world:
-            self._world = wanted
-            self.client.send(wanted)
-        if world.obstacles != self._obstacles:
-            self._send_obstacles(world.obstacles)
-        if session.figure is not self._figure:
-            # Another material: the puppet is another one, in the pose that it has.
-            self._figure = session.figure
-            self.client.send_figure(session.figure, session.core.pose)
-            self._pins = {}
-        held = session.root_is_held
-        own = session.puppet.own
-        pins = {
-            body: firm if body not in own else held or session.figure.parents[body] >= 0
-            for body, firm in session.core.pins.items()
-        }
-        if pins != self._pins:
-            self._pins = pins
-            self.client.send_pins(pins)
-        if settings != self._settings:
-            self._settings = settings
-            self.client.send(settings)
-
-    def _send_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
-        for number, obstacle in enumerate(obstacles):
-            # All of them are read anew at each frame; what has not moved need not be sent again.
-            if number >= len(self._obstacles) or not _alike(obstacle, self._obstacles[number]):
-                self.client.send_obstacle(number, obstacle)
-        for number in range(len(obstacles), len(self._obstacles)):
-            self.client.send_obstacle(number, None)
-        self._obstacles = obstacles
+    def _send(self, settings: DeviceSettings) -> None:
+        self._settings = settings
+        self.client.send(settings)
 
     def _place(self, room: ViewRoom) -> None:
         """Tell devices where the view is; a hand that holds something stays where it is."""
@@ -429,21 +368,6 @@ class DeviceHands(HandsBase):
         self.client.stop()
 
 
-def _same(first: Pose, second: Pose) -> bool:
-    return bool(
-        np.array_equal(first.orientations, second.orientations)
-        and np.array_equal(first.positions, second.positions)
-    )
-
-
-def _alike(first: Obstacle, second: Obstacle) -> bool:
-    return type(first) is type(second) and all(
-        np.array_equal(getattr(first, each.name), getattr(second, each.name))
-        for each in fields(first)
-        if each.init
-    )
-
-
 def _near(first: Workspace, second: Workspace) -> bool:
     """Whether two rooms are so alike that nobody sees the difference."""
     far = max(abs(a - b) for a, b in zip(first.origin, second.origin, strict=True))
@@ -454,19 +378,17 @@ def _near(first: Workspace, second: Workspace) -> bool:
 class NdofHands(HandsBase):
     """One pointer, moved by the events of a space mouse that Blender itself has.
 
-    No bridge is needed: the puppet is simulated in Blender, as with the mouse.
+    The bridge needs no devices then: it only simulates.
     """
 
     def __init__(
         self, session: PuppetSession, clock: Callable[[], float] = time.perf_counter
     ) -> None:
-        super().__init__(session, Client())
+        super().__init__(session, Client(), clock)
         self.position: Floats | None = None
         """(3,) of the pointer, world; none before the first push."""
         self._turn = IDENTITY.copy()
         self._reach = 0.0
-        self._clock = clock
-        self._last = clock()
 
     @property
     def hover(self) -> int | None:
@@ -532,8 +454,7 @@ class NdofHands(HandsBase):
 
     def tick(self, settings: DeviceSettings, room: ViewRoom | None = None) -> list[Button]:  # noqa: ARG002
         """Simulate what has passed, and pose the armature."""
-        now = self._clock()
-        seconds, self._last = now - self._last, now
+        seconds = self.passed()
         self._reach = settings.reach
         held = self.session.held
         if held is None or self.position is None:
@@ -542,5 +463,10 @@ class NdofHands(HandsBase):
             self.session.tick(seconds, self.position, self._turn)
         return []
 
+    def trouble(self) -> str:
+        """Blender has the device, and goes on by itself."""
+        return ""
+
     def stop(self) -> None:
+        self.client.stop()
         self.session.core.release()

@@ -15,7 +15,7 @@ from ...core.errors import DeviceError, OctoMotionError, SettingsError
 from ...core.phrases import joined_phrases, phrase
 from ...core.rotations import Floats
 from ...device.driver import Kind
-from ...device.ipc import Client
+from ...device.ipc import ALONE, Client
 from ...device.messages import Buzz, Notice, Order
 from ..language import reported
 from ..operator_base import OctoOperator
@@ -30,11 +30,12 @@ from .device_hands import (
 )
 from .device_settings import bridge_arguments, device_settings, message
 from .overlay import Overlay, device_lines, take_down_all
-from .pose_operator import SessionOperator, tell
+from .pose_operator import SessionOperator, handled, tell
 from .puppet_session import PuppetSession, active_session
 
 HELP: Final = (
     (phrase("First button or G"), phrase("grab")),
+    (phrase("L Drag"), phrase("pull")),
     (phrase("Second button or K"), phrase("key touched")),
     (phrase("Shift K"), phrase("key all")),
     (phrase("P"), phrase("pin")),
@@ -47,6 +48,12 @@ HELP: Final = (
     (phrase("Enter"), phrase("keep")),
     (phrase("Esc"), phrase("as it was")),
 )
+_LEADS: Final = frozenset(
+    {"LEFTMOUSE", "RIGHTMOUSE", "MOUSEMOVE", "WHEELUPMOUSE", "WHEELDOWNMOUSE"}
+)
+"""What the mouse takes limbs with, beside the devices."""
+_HOLDS: Final = frozenset({"R", "G"})
+"""Its keys while it holds one."""
 _COVERS: Final = 0.7
 """Of what a camera sees from left to right: as much as of a view that is none."""
 _KEYS: Final = frozenset({"ESC", "RET", "NUMPAD_ENTER", "G", "K", "P", "O", "R", "HOME", "B", "Z"})
@@ -145,6 +152,9 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
             return Outcome.PASSED
         if event.type.startswith("NDOF_"):
             return self._push(context, hands, event)
+        leads = event.type in _LEADS or (event.type in _HOLDS and hands.mouse.holding)
+        if leads and isinstance(hands, DeviceHands):
+            return handled(context.window, hands.mouse, event)
         return self._handle(hands, event)
 
     def put_down(self) -> None:
@@ -191,6 +201,8 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
             hands.stop()
             assert self._session is not None
             hands = self.replace(hands, NdofHands(self._session))
+            hands.client.start_soon((ALONE,))
+            self._session.core.share(hands.client)
         settings = device_settings(context.window_manager)
         now = self._device_settings(settings)
         if event.type == "NDOF_MOTION":
@@ -278,8 +290,7 @@ def line(hands: Hands) -> str:
         parts.append(phrase("{device}: {what}", device=each.name, what=what))
     if hands.session.recording:
         parts.append(phrase("● Recording"))
-    if hands.message:
-        parts.append(hands.message)
+    parts += [each for each in (hands.message, hands.mouse.message) if each]
     return joined_phrases("    ", parts)
 
 

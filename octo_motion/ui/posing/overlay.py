@@ -81,7 +81,7 @@ def _aid_lines(session: PuppetSession) -> Lines:
             if len(way) > 1:
                 found.append(_one_colour(np.stack([way[:-1], way[1:]], axis=1), colour, 2.0))
     if wanted.balance != "OFF":
-        balance = session.balancing.now()
+        balance = session.balance()
         centre, outline = balance.centre / unit, balance.outline / unit
         colour = _STANDS if balance.room > 0.0 else _FALLS
         size = 0.02 * session.size

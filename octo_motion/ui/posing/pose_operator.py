@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 import bpy
 
+from ...blender.files import own_folder
 from ...blender.rig import active_armature
 from ...core.errors import OctoMotionError, SettingsError
 from ...core.phrases import joined_phrases, phrase
+from ...device.ipc import ALONE, Client
 from .. import at_work
 from ..language import reported, translated
 from ..operator_base import ArmatureOperator
@@ -135,6 +137,14 @@ class SessionOperator(ArmatureOperator):
             tell(context, None)
 
 
+def handled(
+    window: bpy.types.Window | None, controls: PoseControls, event: bpy.types.Event
+) -> Outcome:
+    """What becomes of an event of a window in the hands of mouse and keys."""
+    found = None if window is None else view_under(window, event.mouse_x, event.mouse_y)
+    return controls.handle(event, *(found or (None,)))
+
+
 def partners(context: bpy.types.Context, armature: bpy.types.Object) -> list[bpy.types.Object]:
     """Other armatures that are posed along: those selected, or in pose mode too."""
     chosen = context.objects_in_mode if context.mode == "POSE" else context.selected_objects
@@ -178,6 +188,7 @@ class OCTO_MOTION_OT_pose_start(SessionOperator, bpy.types.Operator):
     )
 
     _controls: PoseControls | None = None
+    _client: Client | None = None
     _strip: int | None = None
     """The area in whose frame numbers a drag began."""
     _last: float = 0.0
@@ -192,6 +203,10 @@ class OCTO_MOTION_OT_pose_start(SessionOperator, bpy.types.Operator):
 
     def take_up(self, context: bpy.types.Context, session: PuppetSession) -> Overlay:
         self._controls = PoseControls(session)
+        # It takes a moment: until it answers, and a drag that has begun is over, Blender simulates.
+        self._client = Client(log_file=own_folder() / "simulation.log")
+        self._client.start_soon((ALONE,))
+        session.core.share(self._client)
         driven = len(session.puppet.rig.roles.driven)
         if driven:
             self.report(
@@ -222,6 +237,9 @@ class OCTO_MOTION_OT_pose_start(SessionOperator, bpy.types.Operator):
 
     def put_down(self) -> None:
         self._controls = None
+        client, self._client = self._client, None
+        if client is not None:
+            client.stop()
 
     def _handle(
         self, context: bpy.types.Context, controls: PoseControls, event: bpy.types.Event
@@ -229,10 +247,7 @@ class OCTO_MOTION_OT_pose_start(SessionOperator, bpy.types.Operator):
         window = context.window
         if window is not None and self._scrub(window, controls, event):
             return Outcome.TAKEN
-        found = None if window is None else view_under(window, event.mouse_x, event.mouse_y)
-        if found is None:
-            return controls.handle(event, None)
-        return controls.handle(event, *found)
+        return handled(window, controls, event)
 
     def _scrub(
         self, window: bpy.types.Window, controls: PoseControls, event: bpy.types.Event

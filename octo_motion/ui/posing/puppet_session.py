@@ -26,6 +26,7 @@ from ...blender.animation import (
 from ...blender.scene import part_of_pose
 from ...core.errors import OctoMotionError, RigError, SettingsError
 from ...core.phrases import as_phrase, joined_phrases, phrase
+from ...core.posing.balance import Balance, balance_now
 from ...core.posing.picking import Hit, pick
 from ...core.posing.puppet import (
     Elements,
@@ -38,10 +39,11 @@ from ...core.posing.puppet import (
     joint_loads,
     part_of,
 )
-from ...core.posing.session import HandSample, Session, TickReport, hand_for
+from ...core.posing.session import HandSample, TickReport, hand_for
 from ...core.posing.solver import HandSpring, OneThread, WorldSettings
 from ...core.rotations import IDENTITY, Floats, rotate
-from .aids import Balancing, OtherSide, Traces
+from ...device.shared_session import SharedSession
+from .aids import OtherSide, Traces
 from .companions import Companions, company_of, elements_beside, hold_partners
 from .measuring_hand import MeasuringHand, coefficients, measured_joint
 from .properties import posing_settings
@@ -71,7 +73,7 @@ class PosedPuppet:
         """What is wrong with the scene, and keeps nobody from posing."""
         self._scene = scene.session_uid
         figure = self.puppet.figure
-        self.core = Session(
+        self.core = SharedSession(
             replace(figure, elements=self._elements_of(self.puppet.main.figure)),
             self.puppet.pose,
             WorldSettings(**self.settings.world),
@@ -84,7 +86,6 @@ class PosedPuppet:
         hold_partners(self.puppet, self.core)
         self.other_side = OtherSide(self.puppet.main, self.core)
         self.traces = Traces()
-        self.balancing = Balancing(self.core, self.puppet.own)
 
     # --- What is there --------------------------------------------------------------------------
 
@@ -154,10 +155,14 @@ class PosedPuppet:
 
     def loads(self) -> Floats:
         """(bodies,) what each joint bears: 1 where it gives way, or bears all that hangs on it."""
-        loads = np.linalg.norm(self.core.world.joint_loads(), axis=1)
+        loads = np.linalg.norm(self.core.loads(), axis=1)
         limit = self.figure.elements.yield_torque
         limit = np.where(np.isfinite(limit) & (limit > 0.0), limit, self._weights)
         return loads / limit
+
+    def balance(self) -> Balance:
+        """Of the armature's figure: it stands on what is pinned, and on what it touches."""
+        return balance_now(self.core, self.puppet.own, self.core.carried())
 
     def pull(self) -> float:
         """How hard the hand pulls, in weights of the whole figure."""
@@ -560,7 +565,7 @@ class PuppetSession(RecordedPuppet):
         if self.held is not None and position is not None:
             turned = IDENTITY if turn is None else turn
             held[self.held] = HandSample(position * self.unit, turned)
-        self.balancing.keep(kept=self.settings.balance == "KEPT")
+        self.core.kept = self.puppet.own if self.settings.balance == "KEPT" else range(0)
         self.report = self.core.tick(seconds, self.other_side.samples(held))
         point = self.held_point()
         if self.settings.trails and point is not None and held:

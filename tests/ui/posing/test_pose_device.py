@@ -127,6 +127,66 @@ def test_armature_follows_the_hand_at_the_device(hands: DeviceHands) -> None:
     assert "bone2" in keyed
 
 
+class FrontView:
+    """Orthographic, towards +Y; a pixel is a unit."""
+
+    @staticmethod
+    def ray(x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
+        return np.array([x, -5.0, y]), np.array([0.0, 1.0, 0.0])
+
+    @staticmethod
+    def at_depth(x: float, y: float, point: np.ndarray) -> np.ndarray:
+        return np.array([x, point[1], y])
+
+    @staticmethod
+    def axes() -> np.ndarray:
+        return FRONT
+
+
+def test_mouse_holds_a_limb_while_a_device_holds_another(hands: DeviceHands) -> None:
+    """Both in the one session that the bridge simulates: Blender takes no step for either."""
+    grabbed(hands)
+    session = hands.session
+    mouse, view = hands.mouse, FrontView()
+    wait(hands, lambda: session.core.shared, "the bridge simulates")
+    height = float(session.capsules()[0][1].mean(axis=0)[2])
+    mouse.handle(Key("MOUSEMOVE"), view, 0.0, height)
+    assert mouse.hover is not None
+    assert mouse.handle(Key("LEFTMOUSE"), view, 0.0, height) is Outcome.TAKEN
+    mouse.handle(Key("MOUSEMOVE"), view, 0.3, height)
+    held = session.held
+    assert held
+    start = session.held_point()
+    assert start is not None
+
+    def led() -> bool:
+        point = session.held_point()
+        return point is not None and point[0] - start[0] > 0.1
+
+    wait(hands, led, "the mouse leads")
+    assert hands.holding
+    assert hands.client.pointers[0].body != held.body
+    assert session.pull() > 0.0
+    assert session.loads().max() > 0.0
+    assert session.core.shared
+    assert len(device_lines(hands, np.array([0.0, -1.0, 0.0]))) >= 5
+    assert mouse.handle(Key("LEFTMOUSE", "RELEASE"), view, 0.3, height) is Outcome.TAKEN
+    wait(hands, lambda: hands.holding, "the device still holds")
+    assert session.held is None
+
+
+def test_only_limbs_that_a_device_pulled_are_keyed(hands: DeviceHands) -> None:
+    session = hands.session
+    session.toggle_pin(1)  # what is below hangs on nothing that is pulled
+    wait(hands, lambda: session.core.shared, "the bridge simulates")
+    grabbed(hands)
+    wait(hands, lambda: abs(turn_of("bone2")[1:]).max() > 0.01, "the arm bends")
+    hands.grab()
+    wait(hands, lambda: not hands.holding, "it lets go")
+    assert session.core.pulled is not None
+    assert session.key() == ["bone2"]
+
+
 def test_hand_far_from_all_limbs_is_told_so(hands: DeviceHands) -> None:
     wait(hands, hands.shown, "the hand is there")
     far = ViewRoom(np.array([50.0, 0.0, 0.0]), FRONT, 1.0)

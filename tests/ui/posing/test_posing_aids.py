@@ -92,19 +92,19 @@ def test_without_mirror_the_other_side_stays(person: Any, session: PuppetSession
 
 def offset(session: PuppetSession) -> float:
     """Metres from the centre of mass to the middle of what the figure stands on, from above."""
-    balance = session.balancing.now()
+    balance = session.balance()
     return float(np.linalg.norm(balance.centre[:2] - balance.middle)) / session.unit
 
 
 def test_balance_tells_whether_the_figure_would_stand(person: Any, session: PuppetSession) -> None:
-    assert session.balancing.now().room == -np.inf
+    assert session.balance().room == -np.inf
     for foot in ("foot.L", "foot.R"):
         session.toggle_pin(session.body(foot))
     # Between two feet; measured by hand: the middle is at the feet's.
-    assert session.balancing.now().room > 0.0
-    assert session.balancing.now().centre[2] / session.unit == pytest.approx(1.0, abs=0.25)
+    assert session.balance().room > 0.0
+    assert session.balance().centre[2] / session.unit == pytest.approx(1.0, abs=0.25)
     session.toggle_pin(session.body("foot.R"))
-    assert session.balancing.now().room < 0.0
+    assert session.balance().room < 0.0
     assert person is not None
 
 
