@@ -61,6 +61,8 @@ _LIGHTEST, _HEAVIEST, _LARGEST = 1e-15, 1e12, 1e6
 """kg and m of a body: of mites, and of more than ships."""
 _NEARLY: Final = 1e-3
 """By which the length of an orientation may be off 1."""
+_FARTHEST: Final = 1e12
+"""m, m/s and rad/s: what is more is none of a puppet's."""
 MOST_HANDS: Final = 64
 """Of Blender's own: mouse, scripts, and what they do on the other side."""
 _APART: Final = 1e9
@@ -197,6 +199,8 @@ class Place(Message):
         if {len(self.positions), len(self.orientations)} != {count} or sizes not in ({0}, {count}):
             raise MessageError("a pose of another figure")
         _check_turns(self.orientations, self.rest)
+        for each in (self.positions, self.linear, self.angular, self.spin):
+            _check_size(each, _FARTHEST)
         return {"orientations": self.orientations, **motion} if sizes == {count} else {}
 
 
@@ -206,8 +210,14 @@ MOTION: Final = ("rest", "linear", "angular", "spin")
 
 def _check_turns(*turns: Floats) -> None:
     for each in turns:
+        _check_size(each, 2.0)
         if not (np.abs(np.linalg.norm(each, axis=1) - 1.0) < _NEARLY).all():
             raise MessageError("an orientation that is none")
+
+
+def _check_size(numbers: Floats, most: float) -> None:
+    if np.abs(numbers).max(initial=0.0) > most:
+        raise MessageError("a number that is too large")
 
 
 @dataclass(frozen=True, eq=False)
@@ -562,6 +572,7 @@ class Tick(Message):
         if self.seconds < 0.0:
             raise MessageError("time does not run backwards")
         _check_turns(self.orientations)
+        _check_size(self.positions, _FARTHEST)
         places = zip(self.hands, self.positions, self.orientations, strict=True)
         return {hand: HandSample(position, turn) for hand, position, turn in places}
 
@@ -579,6 +590,7 @@ class Take(Message):
     """As ``Coupling`` has it."""
 
     def coupling(self) -> Coupling:
+        _check_size(np.array(self.point), _FARTHEST)
         if min(self.pull) < 0.0:
             raise MessageError("a hand that pushes away")
         return Coupling(*self.pull)

@@ -45,8 +45,9 @@ EXAMPLES: list[say.Message] = [
     say.LetGo(4),
     say.TurnBack((1, 0) * 10, POSE.positions, POSE.orientations),
     say.Ticked(
-        *(7, 2, 9, 0.5, 0.016, 16, 1.0, 1e-3, False, POSE.positions, POSE.orientations),
-        *(POSE.orientations, *(POSE.positions,) * 4, (1, 0) * 10, (3,), (4,), np.ones((1, 6))),
+        *(7, 2, 9, 0.5, 0.016, 16, 1.0, 1e-3, *(False,), POSE.positions, POSE.orientations),
+        *(POSE.orientations, POSE.positions, POSE.positions, POSE.positions, POSE.positions),
+        *((1, 0) * 10, (3,), (4,), np.ones((1, 6))),
     ),
     say.Grab(1, grab=True),
     say.Settings(force=0.5, toggle=True),

@@ -16,6 +16,7 @@ from octo_motion.core.posing.puppet import Figure
 from octo_motion.core.posing.session import HandSample
 from octo_motion.core.posing.solver import Plane, World, WorldSettings
 from octo_motion.core.rotations import IDENTITY, Floats, from_axis_angle
+from octo_motion.core.rotations.scalars import Vector
 from octo_motion.device import bridge_process
 from octo_motion.device import messages as say
 from octo_motion.device.bridge_process import Bridge
@@ -28,6 +29,12 @@ from tests.device.bridges import PATIENCE, bridge_of
 TICK = 1.0 / 60.0
 CLAY = doll(soft(20, 40.0, 2.0, 4.0, 1.0))
 SIDE = np.array([1.0, 0.0, 0.0])
+
+
+def hand_message(now: float, grab: int, at: Vector) -> say.HandMessage:
+    """Of a device's hand at a place, which rests."""
+    still, turn = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+    return say.HandMessage(0, now, grab, at, turn, still, still, still, still, 0)
 
 
 class Line:
@@ -236,13 +243,12 @@ def test_mouse_and_device_hold_two_limbs_of_one_session() -> None:
     assert simulation
     tip, middle = session.pose.positions[[5, 2]]
     x, y, z = map(float, np.add(tip, [0.0, 0.15, 0.0]))
-    still, turn = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
     mouse = session.grab(2, middle)
     for number in range(300):
         now = 1.0 + 2e-3 * number
         share = min(1.0, number / 200)
         at = (x + 0.2 * share, y, z)
-        bridge._heard[0] = say.HandMessage(0, now, 1, at, turn, *(still,) * 4, 0)
+        bridge._heard[0] = hand_message(now, 1, at)
         if number % 8 == 0:
             session.tick(
                 TICK, {mouse: HandSample(np.add(middle, [0.0, 0.0, 0.1 * share]), IDENTITY)}
@@ -267,8 +273,7 @@ def test_balance_is_kept_while_a_device_keeps_time_too() -> None:
     pair = Pair(gravity=(0.0, 0.0, -9.81))
     pair.shared.pin(0, state=False)
     pair.shared.kept = range(20)
-    still, turn = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
-    pair.bridge._heard[0] = say.HandMessage(0, 0.0, 0, (9.0, 9.0, 9.0), turn, *(still,) * 4, 0)
+    pair.bridge._heard[0] = hand_message(0.0, 0, (9.0, 9.0, 9.0))
     simulation = pair.bridge.simulation
     assert simulation
     for number in range(300):
@@ -374,7 +379,9 @@ def test_bridge_killed_in_mid_drag_leaves_the_drag_and_says_so_once(client: Clie
     assert np.abs(session.pose.positions - before.positions).max() < 0.1
     for _ in range(30):
         session.tick(TICK, there)
-    np.testing.assert_allclose(session.held_point(), np.add(point, [0.1, 0.0, 0.1]), atol=0.05)
+    held = session.held_point()
+    assert held is not None
+    np.testing.assert_allclose(held, np.add(point, [0.1, 0.0, 0.1]), atol=0.05)
     assert session.said == ""
     assert set(session.touched())
     session.release()

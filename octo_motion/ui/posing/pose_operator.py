@@ -142,7 +142,7 @@ def handled(
 ) -> Outcome:
     """What becomes of an event of a window in the hands of mouse and keys."""
     found = None if window is None else view_under(window, event.mouse_x, event.mouse_y)
-    return controls.handle(event, *(found or (None,)))
+    return controls.handle(event, None) if found is None else controls.handle(event, *found)
 
 
 def partners(context: bpy.types.Context, armature: bpy.types.Object) -> list[bpy.types.Object]:
