@@ -7,10 +7,11 @@ walk with everything on, ours by frames and by arms, live motion, and splices. O
 the operator's call to the action on the armature, travel included; Blender's is the bake alone.
 Each measurement has a process of its own.
 
-A first word measures one thing: "splicing" the quality of splices, "live" how fast a walk follows
-a change, "apart" how far arms pass through each other, "keys" how many keys *Few* leaves of each
-gait, "device" how well the loop at the devices keeps time, "posing" how long a step of the plastic
-puppet takes, "follow" how long follow-through takes. Their own --help tells more.
+A first word measures one thing: "splicing" the quality of splices, "copies" how little they hang
+on rest poses, units and file formats, "live" how fast a walk follows a change, "apart" how far arms
+pass through each other, "keys" how many keys *Few* leaves of each gait, "device" how well the loop
+at the devices keeps time, "posing" how long a step of the plastic puppet takes, "follow" how long
+follow-through takes. Their own --help tells more.
 
 --write measures all that docs/speed.md, docs/quality.md and docs/apart.md show, or the sections
 that are named after it, keeps it in tests/bench/figures.json and writes it into the pages. Recorded
@@ -31,6 +32,7 @@ from tests.bench.comparison import Options
 
 _APART: Final = {
     "splicing": "splicing",
+    "copies": "copies",
     "posing": "posing",
     "apart": "apart",
     "keys": "few_keys",

@@ -88,7 +88,7 @@ class Measured:
 def main(words: Sequence[str]) -> None:
     """Measure what the command line asks for, and print a table."""
     arguments = _arguments(words)
-    with _quiet_blender() as told:
+    with quiet_blender() as told:
         takes, left_out, results = _spliced(
             arguments.folders or [EXAMPLES], arguments.base, arguments.clips
         )
@@ -103,12 +103,12 @@ def main(words: Sequence[str]) -> None:
 
 def summary(folders: Sequence[Path], bases: Sequence[str]) -> dict[str, Any]:
     """What all clips of some folders come to on those bases whose names have one of these words."""
-    with _quiet_blender():
+    with quiet_blender():
         return _summary(*_spliced(folders, bases, ()))
 
 
 @contextmanager
-def _quiet_blender() -> Iterator[TextIO]:
+def quiet_blender() -> Iterator[TextIO]:
     """Blender tells of everything that it imports; what is printed to this is seen all the same."""
     sys.stdout.flush()
     shown = os.dup(1)

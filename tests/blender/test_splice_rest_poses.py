@@ -40,7 +40,7 @@ def mapped(path: Path, kept: Landmarks | None = None) -> tuple[Clip, Landmarks]:
 
 
 @pytest.mark.parametrize("rest", RESTS)
-@pytest.mark.parametrize("name", WALKS)
+@pytest.mark.parametrize("name", [*WALKS, "makehuman/walk1.bvh"])
 def test_landmarks_are_found_in_any_rest_pose(
     shared_data: SharedData, tmp_path: Path, name: str, rest: str
 ) -> None:

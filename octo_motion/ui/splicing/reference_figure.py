@@ -51,7 +51,7 @@ def figure_lines(clip: Clip, landmarks: Landmarks) -> Lines:
             "The joints of this body do not tell how it stands.",
             "Look at hips, chest, thighs and upper arms in the table, or choose another action.",
         )
-    rested = with_rest_pose(clip.skeleton, found.orientations)
+    rested = with_rest_pose(clip.skeleton, found.orientations, found.offsets)
     heads = {
         name: rested.heads[rested.index[bone]]
         for name, bone in landmarks.bones.items()

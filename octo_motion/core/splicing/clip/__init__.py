@@ -23,6 +23,7 @@ from .rest_pose import (
     average_pose,
     robust_direction,
     robust_rotations,
+    usual_offsets,
     with_rest_pose,
 )
 from .splice_timing import (
@@ -64,6 +65,7 @@ __all__ = [
     "splice_span",
     "splice_window",
     "unposed",
+    "usual_offsets",
     "window_middle",
     "with_rest_pose",
     "without_scale",

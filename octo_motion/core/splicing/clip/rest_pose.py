@@ -15,6 +15,9 @@ from .clip import Clip
 _NEAR: Final = 0.05
 """Radians (and of a unit vector): what lies nearer to the robust mean weighs no more than this."""
 
+_ROUNDING: Final = 1e-9
+"""Of a body's size: below, a bone sits where it did."""
+
 _ROUNDS: Final = 12
 """Of reweighting: means move by less than 1e-4 afterwards."""
 
@@ -22,19 +25,67 @@ _LOOKS: Final = 100
 """Frames of a clip from which its average pose is found."""
 
 
-def with_rest_pose(skeleton: Skeleton, orientations: Floats) -> Skeleton:
+def with_rest_pose(
+    skeleton: Skeleton, orientations: Floats, offsets: Floats | None = None
+) -> Skeleton:
     """The same bones at rest with other orientations (bones, 4), armature space; roots begin where
-    they did.
+    they did, others where they sit on their parents: ``offsets`` (bones, 3) along these, as at rest
+    if not given.
     """
+    offsets = rest_offsets(skeleton) if offsets is None else offsets
     matrices = skeleton.rest_matrices.copy()
     matrices[:, :3, :3] = to_matrix(orientations)
     for bone, parent in enumerate(skeleton.parents):
         if parent >= 0:
-            offset = skeleton.heads[bone] - skeleton.heads[parent]
-            offset = rotate(conjugate(skeleton.rest_rotations[parent]), offset)
-            turned = rotate(orientations[parent], offset)
+            turned = rotate(orientations[parent], offsets[bone])
             matrices[bone, :3, 3] = matrices[parent, :3, 3] + turned
     return replace(skeleton, rest_matrices=matrices)
+
+
+def rest_offsets(skeleton: Skeleton) -> Floats:
+    """Where bones sit on their parents at rest (bones, 3), along the parents' axes; of roots 0."""
+    parents = np.array(skeleton.parents)
+    above = np.maximum(parents, 0)
+    offsets = rotate(
+        conjugate(skeleton.rest_rotations[above]), skeleton.heads - skeleton.heads[above]
+    )
+    return np.where((parents < 0)[:, None], 0.0, offsets)
+
+
+def usual_offsets(clip: Clip) -> Floats:
+    """Where bones sit on their parents while a clip plays (bones, 3), along the parents' axes, as a
+    robust mean; of roots 0. A file may rest with its joints elsewhere, and move them with keys.
+    """
+    skeleton = clip.skeleton
+    offsets = rest_offsets(skeleton)
+    rows = _looks(clip)
+    moved = [
+        bone
+        for bone in np.flatnonzero(clip.locations[rows].any(axis=(0, 2))).tolist()
+        if skeleton.parents[bone] >= 0
+    ]
+    if not moved:
+        return offsets
+    turns, heads = skeleton.pose(clip.rotations[rows], clip.locations[rows])
+    parents = [skeleton.parents[bone] for bone in moved]
+    places = rotate(conjugate(turns[:, parents]), heads[:, moved] - heads[:, parents])
+    offsets[moved] = _robust_places(places)
+    return offsets
+
+
+def _robust_places(places: Floats) -> Floats:
+    """Geometric medians (bones, 3) of places (moments, bones, 3), after Weiszfeld."""
+    mean = places.mean(axis=0)
+    near = np.linalg.norm(places - mean, axis=-1).max(axis=0) * _NEAR + 1e-12
+    for _ in range(_ROUNDS):
+        weights = 1.0 / np.maximum(np.linalg.norm(places - mean, axis=-1), near)
+        mean = np.einsum("mb,mbi->bi", weights, places) / weights.sum(axis=0)[:, None]
+    return mean
+
+
+def _looks(clip: Clip) -> np.ndarray:
+    """Rows of a clip from which one sees how it is on average."""
+    return np.linspace(0, len(clip) - 1, min(len(clip), _LOOKS)).astype(np.intp)
 
 
 def average_pose(clip: Clip) -> Skeleton:
@@ -42,16 +93,15 @@ def average_pose(clip: Clip) -> Skeleton:
     pose of its body.
     """
     skeleton = clip.skeleton
-    rows = np.linspace(0, len(clip) - 1, min(len(clip), _LOOKS)).astype(np.intp)
-    turns, _ = skeleton.pose(clip.rotations[rows])
+    turns, _ = skeleton.pose(clip.rotations[_looks(clip)])
     parents = np.array(skeleton.parents)
     between = multiply(conjugate(turns[:, np.maximum(parents, 0)]), turns)
     between[:, parents < 0] = turns[:, parents < 0]
-    means = robust_rotations(between, np.ones((len(rows), 1)))
+    means = robust_rotations(between, np.ones((len(turns), 1)))
     for bone, parent in enumerate(skeleton.parents):
         if parent >= 0:
             means[bone] = multiply(means[parent], means[bone])
-    return with_rest_pose(skeleton, means)
+    return with_rest_pose(skeleton, means, usual_offsets(clip))
 
 
 class Reresting:
@@ -68,6 +118,11 @@ class Reresting:
         carried = multiply(conjugate(above[1]), above[0])
         self._turns = np.where(free, alone, carried)
         self._shifts = np.where(roots, alone, carried)
+        # What a bone sits otherwise on its parent, along its own axes there.
+        nearer = rest_offsets(skeleton) - rest_offsets(rested)
+        size = float(np.ptp(skeleton.heads, axis=0).max())
+        there = roots | (np.linalg.norm(nearer, axis=1, keepdims=True) <= _ROUNDING * size)
+        self._places = np.where(there, 0.0, rotate(conjugate(above[1]), nearer))
 
     def into(self, clip: Clip) -> Clip:
         """The clip on the other rest pose: all bones are where they were."""
@@ -75,7 +130,7 @@ class Reresting:
             clip,
             skeleton=self.rested,
             rotations=multiply(self._turns, clip.rotations),
-            locations=rotate(self._shifts, clip.locations),
+            locations=rotate(self._shifts, clip.locations) + self._places,
         )
 
     def back(self, clip: Clip, before: Clip, given: Clip) -> Clip:
@@ -87,7 +142,7 @@ class Reresting:
             given: the same on its own rest pose: what was not changed stays to the last digit.
         """
         turned = multiply(conjugate(self._turns), clip.rotations)
-        moved = rotate(conjugate(self._shifts), clip.locations)
+        moved = rotate(conjugate(self._shifts), clip.locations - self._places)
         still = np.all(clip.rotations == before.rotations, axis=-1, keepdims=True)
         there = np.all(clip.locations == before.locations, axis=-1, keepdims=True)
         return replace(

@@ -157,13 +157,13 @@ def _are_beside(body: BodyProportions, one: int, other: int) -> bool:
 def _straightest(body: BodyProportions, before: int, bones: Sequence[int]) -> int:
     """The bone whose far end deviates least from the one before it."""
     skeleton = body.skeleton
-    along = skeleton.rest_matrices[before][:3, 1]
+    along = skeleton.heads[list(bones)].mean(axis=0) - skeleton.heads[before]
 
     def deviation(bone: int) -> float:
         children = skeleton.children[bone]
         tip = skeleton.heads[list(children)].mean(axis=0) if children else skeleton.tails[bone]
         way = tip - skeleton.heads[before]
-        return 1.0 - float(way @ along) / max(float(np.linalg.norm(way)), 1e-12)
+        return -float(way @ along) / max(float(np.linalg.norm(way)), 1e-12)
 
     return min(bones, key=deviation)
 
@@ -177,7 +177,14 @@ def _fit(body: BodyProportions, bone: int, part: str) -> float:
         # Keys have no effect on it; there is another one that moves it.
         weight -= 0.3 * weight
     parent = body.skeleton.parents[bone]
-    if parent >= 0 and body.weight(parent, part) >= body.weight(bone, part):
+    if _leads_to_its_own(body.skeleton, bone):
+        # "__Clavicle → Clavicle": the first one bridges the gap to the joint.
+        weight *= 0.6
+    elif (
+        parent >= 0
+        and body.weight(parent, part) >= body.weight(bone, part)
+        and not _leads_to_its_own(body.skeleton, parent)
+    ):
         # "upperarm01 → upperarm02": the first one is the joint.
         weight -= 0.1 * weight
     if part in {"upper_arm", "thigh"} and body.off_middle(bone) < 0.005:
@@ -187,6 +194,13 @@ def _fit(body: BodyProportions, bone: int, part: str) -> float:
         # So does a collar bone, where there are two in a row.
         weight *= 0.85
     return weight
+
+
+def _leads_to_its_own(skeleton: Skeleton, bone: int) -> bool:
+    """Whether a bone is called as its child is, but for underscores in front."""
+    name = skeleton.names[bone]
+    bare = name.lstrip("_")
+    return bare != name and any(skeleton.names[each] == bare for each in skeleton.children[bone])
 
 
 def _best_sequence(

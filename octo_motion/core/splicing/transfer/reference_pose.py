@@ -36,7 +36,7 @@ from ...rotations import (
     shortest_arc,
 )
 from ...smoothing import smooth_step
-from ..clip import Clip, robust_direction, robust_rotations
+from ..clip import Clip, robust_direction, robust_rotations, usual_offsets
 from ..humanoid import Landmarks, palm_directions, palm_roots
 from .parts import spoken
 
@@ -108,6 +108,8 @@ class ReferencePose:
 
     orientations: Floats
     """(bones, 4), armature space."""
+    offsets: Floats
+    """(bones, 3): where bones sit on their parents, along these."""
     fixed: dict[str, dict[str, Floats]]
     """Joints that never move against the chest and the hips: places along the bone's axes, by
     landmark, by "chest" and "hips"."""
@@ -150,8 +152,9 @@ def find_reference_pose(
     } <= {name for name, bone in landmarks.bones.items() if bone in clip.skeleton.index}:
         return None
     try:
-        finder = _Finder(_told_by(clip, landmarks), landmarks)
-        return finder.pose(fingers=fingers, palms=palms)
+        told = _told_by(clip, landmarks)
+        finder = _Finder(told, landmarks)
+        return finder.pose(usual_offsets(told), fingers=fingers, palms=palms)
     except _NoFrameError:
         return None
 
@@ -205,7 +208,7 @@ class _Finder:
         self._bones = {name: index[bone] for name, bone in landmarks.bones.items() if bone in index}
         self._standing = self._how_standing()
 
-    def pose(self, *, fingers: bool, palms: bool) -> ReferencePose:
+    def pose(self, offsets: Floats, *, fingers: bool, palms: bool) -> ReferencePose:
         """The whole."""
         made: dict[int, Floats] = {}
         hips, chest = self._bones["hips"], self._bones["chest"]
@@ -225,7 +228,7 @@ class _Finder:
             made |= self._palms_down()
         self._means(made, hips, chest)
         orientations = np.array([made[bone] for bone in range(len(self._skeleton))])
-        return ReferencePose(orientations, self._fixed())
+        return ReferencePose(orientations, offsets, self._fixed())
 
     def upward(self) -> Floats:
         """(3,) from feet to head of who stands."""

@@ -54,6 +54,7 @@ from .parts import (
     sided,
 )
 from .reference_pose import ReferencePose, find_reference_pose, has_fingers, has_palms, standing_up
+from .same_body import agreeing
 from .upright import Body, body_of, facing, stand_over
 
 _HINGE_SAMPLES = 200
@@ -79,7 +80,12 @@ class MappedClip:
         found = find_reference_pose(self.clip, self.landmarks, fingers=fingers, palms=palms)
         if found is None:
             return self
-        rests = Reresting(self.skeleton, with_rest_pose(self.skeleton, found.orientations))
+        return self.referred(found)
+
+    def referred(self, found: ReferencePose) -> ReferredClip:
+        """The clip with a reference pose as its rest pose."""
+        rested = with_rest_pose(self.skeleton, found.orientations, found.offsets)
+        rests = Reresting(self.skeleton, rested)
         return ReferredClip(rests.into(self.clip), self.landmarks, found, rests)
 
     @cached_property
@@ -161,8 +167,13 @@ def compared(base: MappedClip, splice: MappedClip) -> tuple[MappedClip, MappedCl
     referred = tuple(
         each.in_reference_pose(fingers=fingers, palms=palms) for each in (base, splice)
     )
-    if any(each.reference is None for each in referred):
+    first, second = (each.reference for each in referred)
+    if first is None or second is None:
         return base, splice
+    if not asked and same_build(base.skeleton, splice.skeleton, marks):
+        found = first.orientations, second.orientations
+        agreed = agreeing((base.clip, splice.clip), marks, found)
+        return referred[0], splice.referred(replace(second, orientations=agreed))
     return referred[0], referred[1]
 
 
