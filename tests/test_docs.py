@@ -194,6 +194,8 @@ def described(group: str) -> dict[str, list[str]]:
             return rows(after("An item of `along`:", "## Settings along the route"))
         case "body":
             return rows(section("## Body"))
+        case "given_pose":
+            return rows(section("## Begin and end in a pose"))
         case "ground":
             return rows(section("## The ground").split("An item of", 1)[0])
         case "contact":
@@ -248,6 +250,7 @@ def group_class(group: str) -> Any:
         "change": lists.OCTO_MOTION_PG_change,
         "place": lists.ChangeItem,
         "along": lists.AlongItem,
+        "given_pose": lists.OCTO_MOTION_PG_given_pose,
         "landmarks": OCTO_MOTION_PG_landmarks,
         "posing": OCTO_MOTION_PG_posing,
         "splicing": OCTO_MOTION_PG_splicing,
@@ -313,7 +316,7 @@ def number(value: float, definition: Any) -> str:
     "group",
     [
         *("locomotion", "arm", "bone", "reach", "change", "place", "ground", "contact", "body"),
-        *("figure", "along"),
+        *("figure", "along", "given_pose"),
         *("table", "curve", "knot", "offset", "note"),
         *("splicing", "splice", "landmarks", "posing"),
         *("follow_through", "chain"),

@@ -25,6 +25,7 @@ from .clips import (
     further_channels,
     is_recorded,
     read_clip,
+    read_pose,
     resized_bones,
     scene_rate,
     setting_values,
@@ -32,7 +33,7 @@ from .clips import (
 )
 from .fcurves import lasting
 from .object_keys import ObjectKeys
-from .pose_assets import make_pose_asset
+from .pose_assets import make_pose_action, make_pose_asset
 from .pose_keys import Keyed, PoseKeys, mark_file_changed
 from .poses import (
     SCALE,
@@ -85,6 +86,7 @@ __all__ = [
     "lasting",
     "lay_edits",
     "layers_off",
+    "make_pose_action",
     "make_pose_asset",
     "mark_file_changed",
     "may_replace",
@@ -96,6 +98,7 @@ __all__ = [
     "read_channels",
     "read_clip",
     "read_object_channels",
+    "read_pose",
     "renumber_keys",
     "resized_bones",
     "rest_channel",

@@ -129,6 +129,33 @@ def read_clip(
     )
 
 
+def read_pose(
+    armature: bpy.types.Object, action: bpy.types.Action, frame: float
+) -> tuple[dict[str, tuple[Floats, Floats, Floats]], Floats | None]:
+    """The pose that an action has an armature in at a frame, by its keys alone.
+
+    Returns:
+        By bone that it moves, rotation (4,), location (3,) and scale (3,) from rest as Blender has
+        them; and the world matrix (4, 4) of the object, none if it does not move that.
+
+    Raises:
+        ClipError: it has no slot for the armature, or no keys.
+    """
+    slot, skeleton = slot_of(armature, action), read_skeleton(armature)
+    curves, times = _curves_of(action, slot, skeleton), np.array([frame])
+    modes = _rotation_modes(armature, skeleton)
+    found: dict[str, tuple[Floats, Floats, Floats]] = {}
+    for name in dict.fromkeys(owner for owner, _ in curves if owner):
+        turn = rotation_property(modes[name])
+        turned, moved, scaled = (
+            _values(curves, name, channel, AT_REST[channel], times)
+            for channel in (turn, "location", "scale")
+        )
+        found[name] = from_mode_values(turned, modes[name])[0], moved[0], scaled[0]
+    placed = any(not owner for owner, _ in curves)
+    return found, _object_motion(armature, curves, times)[0][0] if placed else None
+
+
 def write_clip(
     armature: bpy.types.Object,
     clip: Clip,

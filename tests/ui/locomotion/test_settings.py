@@ -24,7 +24,7 @@ from tests.ui.rig import give_route, make_octopus
 
 # What scripts rely on: a name is never changed or removed.
 NAMES = {
-    *("along", "active_along"),
+    *("along", "active_along", "begin_pose", "end_pose"),
     *("arms", "active_arm", "body_front", "body_up", "root_bone", "keep_pose"),
     *("route", "spline", "speed_mode", "ease_in", "ease_out"),
     *("heading", "heading_angle", "keep_upright", "look_ahead", "corner"),

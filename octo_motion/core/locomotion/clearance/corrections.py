@@ -630,8 +630,8 @@ def keep_off_ground(
 ) -> Floats:
     """Rotations (frames, bones, 4) of the same arms off the ground.
 
-    Radii are metres from each joint (joints,) of an arm to the skin below it; ``loose`` (frames,
-    arms) is how far each is to be raised, 0…1.
+    Radii are metres from each joint (joints,) of an arm to the skin below it, or for all frames
+    (frames, joints); ``loose`` (frames, arms) is how far each is to be raised, 0…1.
     """
     result = poses.rotations.copy()
     for number, arm in enumerate(course.arms):
@@ -644,7 +644,8 @@ def keep_off_ground(
         directions = rotate(multiply(facing, frames), _ALONG)
         roots = poses.locations[chosen] + rotate(facing[:, 0], course.scale * arm.root)
         reach = np.concatenate([np.zeros((len(chosen), 1)), np.cumsum(lengths, axis=1)], axis=1)
-        needed = room_needed(radii[number], reach[:, -1:])
+        below = np.broadcast_to(radii[number], (len(loose), reach.shape[1]))[chosen]
+        needed = room_needed(below, reach[:, -1:])
         own = loose_from_root(reach, reach[:, -1:]) * loose[chosen, number, None]
         room = JointRoom(
             np.ascontiguousarray(needed.T),

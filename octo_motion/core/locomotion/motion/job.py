@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -173,6 +173,24 @@ class BodyJob:
 
 
 @dataclass(frozen=True, eq=False)
+class GivenPose:
+    """A pose of the artist's that a motion begins or ends in."""
+
+    turns: Mapping[str, Floats]
+    """(4,) rotations of all bones that it moves, in their rest frames …"""
+    moves: Mapping[str, Floats]
+    """… and their locations (3,) …"""
+    sizes: Mapping[str, Floats]
+    """… and scales (3,)."""
+    place: tuple[Floats, Floats] | None
+    """Location (3,) and orientation (4,) of the armature, world, as what travels carries it; none
+    for wherever the motion has it."""
+    frames: int
+    """Over how many it goes over."""
+
+
+# In one piece, for it is all that there is to say to core at once.
+@dataclass(frozen=True, eq=False)
 class MotionJob:
     """All that one motion is made from, as it was read."""
 
@@ -207,6 +225,10 @@ class MotionJob:
     """How far few keys may be off, distances in arm lengths; none for a key on every frame."""
     floor: Floor | None = None
     """What lies below where no gait holds on to it, none where nothing does; for figures alone."""
+    begin: GivenPose | None = None
+    """The pose in which it begins, none for its own …"""
+    end: GivenPose | None = None
+    """… and the one in which it ends."""
     live: bool = False
     """Whether it is to be quick: the same motion with a key on every frame, and without figures of
     how good it is."""

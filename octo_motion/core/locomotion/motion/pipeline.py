@@ -33,6 +33,18 @@ from ..path import plan_travel
 from ..reaching import Carried, Reached, Travelling
 from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
 from .few_keys import Motion, measure_keyed, reduced
+from .handover import (
+    ArmsAround,
+    Handover,
+    eased_places,
+    eased_stay,
+    further_channels,
+    hand_over_arms,
+    hand_over_organs,
+    hand_over_stretch,
+    handovers,
+    near_enough,
+)
 from .job import MotionJob, Tolerances, Trailing
 from .planning import MotionPlan, frames_of_arms, plan_motion
 from .segments import SegmentedMotion
@@ -144,11 +156,12 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     posed = yield from _scaled(posing, 0.0, _TRAILING * moving if trailing else moving)
     if trailing is not None:
         yield from _scaled(_trail(plan, trailing, posed), _TRAILING * moving, moving)
+    if posed.hands:
+        _hand_over(plan, posed)
     yield moving
     arms, going, keyed, reached = posed.arms, posed.going, posed.keyed, posed.reached
     warnings = [*plan.warnings, *posed.warnings]
-    organs = _organs(plan, moments, keyed, posed.swimming)
-    motion = _motion(plan, arms, keyed, organs)
+    motion, further = _motion(plan, posed, moments)
     on_frames = arms.at(slice(None, None, every))
     framed = going[0][::every], going[1][::every]
     measured, overlaps = _measured(plan, on_frames, framed, keyed)
@@ -160,9 +173,11 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
         if measured is not None:
             travels = not plan.job.in_place
             measured = measure_keyed(measured, plan.job.creature, channels, travels=travels)
+    # What is in a pose alone is on each frame, however few keys the motion has.
+    further = [replace(each, values=each.values[::every]) for each in further]
     result = MotionResult(
         plan=plan,
-        channels=channels,
+        channels=[*channels, *further],
         automatic=not reducing,
         arms=arms,
         carried=reached.carried if reached is not None else (),
@@ -188,6 +203,8 @@ class _Posed:
     """How far (moments,) it swims; none where the gait never changes."""
     reached: Reached | None
     warnings: list[str]
+    hands: list[Handover]
+    """The poses that it begins and ends in."""
 
 
 def _moments(plan: MotionPlan) -> tuple[Floats, Floats]:
@@ -212,9 +229,16 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     offset = None if plan.surge is None else plan.surge.at(travel.distance)
     if offset is not None:
         places = places[0] + offset, places[1]
+    creature, hands = job.creature, _handovers(plan, times)
+    eased = places
+    if hands and not job.in_place:
+        eased = eased_places(hands, creature.body, creature.scale, places)
+        places = near_enough(places, eased, plan.first.poser.arm_length * creature.scale)
     # In place the ground goes by, and arms are measured as if the body went along it.
-    going = object_transforms(job.creature.body, job.creature.scale, *places)
+    going = object_transforms(creature.body, creature.scale, *places)
     keyed = _stays(plan, going, offset) if job.in_place else going
+    if hands and job.in_place:
+        keyed = eased_stay(hands, keyed)
     frames_per_metre = every * plan.pace.mean / plan.schedule.travel.stride
     made = yield from segments.compute(travel, places, step, frames_per_metre, cyclic=cyclic)
     # Each of these takes a while; who works in turns looks about in between.
@@ -226,7 +250,35 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     yield 0.96
     warnings = _separate(plan, arms, reached, going, swimming=swimming, cyclic=cyclic)
     _take_time(plan, arms, reached, going, cyclic=cyclic)
-    return _Posed(arms, going, keyed, swimming, reached, warnings)
+    if hands and not job.in_place:
+        keyed = going = object_transforms(creature.body, creature.scale, *eased)
+    return _Posed(arms, going, keyed, swimming, reached, warnings, hands)
+
+
+def _has_poses(plan: MotionPlan) -> bool:
+    """Whether it begins or ends in a pose that is given."""
+    return plan.job.begin is not None or plan.job.end is not None
+
+
+def _handovers(plan: MotionPlan, times: Floats) -> list[Handover]:
+    """The poses that a motion begins and ends in, at times (moments,)."""
+    if not _has_poses(plan):
+        return []
+    known = plan.schedule
+    frames = np.interp(times, known.times, known.frames)
+    ends = float(known.frames[0]), float(known.frames[-1])
+    return handovers(plan.job.begin, plan.job.end, frames, ends)
+
+
+def _hand_over(plan: MotionPlan, posed: _Posed) -> None:
+    """Let arms go over between their motion and poses; in place there is nothing to stand on."""
+    creature, ground = plan.job.creature, _underfoot(plan)
+    frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
+    below = None
+    if ground is not None and not plan.job.in_place:
+        below = ground, plan.standing[0].radii
+    around = ArmsAround(creature, frames, posed.going, below)
+    hand_over_arms(posed.hands, posed.arms, around)
 
 
 def glimpse(plan: MotionPlan, frame: float) -> list[Glimpsed]:
@@ -249,11 +301,12 @@ def glimpse(plan: MotionPlan, frame: float) -> list[Glimpsed]:
     first, last = max(middle - around, 0), middle + around + 1
     steps = _posed(plan, times[first:last], 2 * around + 1, cyclic=False)
     posed = _finished(steps)
-    organs = _organs(plan, moments[first:last], posed.keyed, posed.swimming)
-    motion = _motion(plan, posed.arms, posed.keyed, organs)
-    channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.stretch]
+    if posed.hands:
+        _hand_over(plan, posed)
+    motion, further = _motion(plan, posed, moments[first:last], every_width=True)
     # A scale of 1 as well: what it is elsewhere in the motion is not known here.
-    channels += [plan.job.creature.channels.scale(*each) for each in organs.scales.items()]
+    channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.widths, *motion.stretch]
+    channels += further
     return [Glimpsed(each.data_path, each.values[middle - first]) for each in channels]
 
 
@@ -572,9 +625,17 @@ def _organs(
     return pose_organs(plan.self_motion, organs, creature.skeleton, up, moments)
 
 
-def _motion(plan: MotionPlan, arms: ArmMotion, keyed: Travelled, organs: OrganPoses) -> Motion:
-    """What was computed, as channels with a key at every moment."""
+def _motion(
+    plan: MotionPlan, posed: _Posed, moments: Floats, *, every_width: bool = False
+) -> tuple[Motion, list[Channel]]:
+    """What was computed, as channels with a key at every moment (moments,), and those of what only
+    poses have that it begins or ends in.
+    """
+    arms, keyed, hands = posed.arms, posed.keyed, posed.hands
     creature, channels = plan.job.creature, plan.job.creature.channels
+    organs = _organs(plan, moments, keyed, posed.swimming)
+    if hands:
+        organs = hand_over_organs(hands, organs)
     if bone := creature.root_bone:
         locations, rotations = root_bone_transforms(creature.skeleton, bone, creature.world, *keyed)
         travel = [
@@ -590,18 +651,24 @@ def _motion(plan: MotionPlan, arms: ArmMotion, keyed: Travelled, organs: OrganPo
     # A swim that becomes a walk stretches there.
     if any(each.stretching for each in plan.standing):
         stretches = channels.stretches(creature.bones, arms.strains)
-    return Motion(
+    if hands:
+        stretches = hand_over_stretch(hands, stretches)
+    motion = Motion(
         travel=travel,
         arms=channels.rotations(plan.first.poser.bones, arms.rotations),
         mantle=channels.rotations(organs.bones, organs.rotations),
         widths=[
             channels.scale(name, each)
             for name, each in organs.scales.items()
-            if np.abs(each - 1.0).max() > _UNSCALED
+            if every_width or np.abs(each - 1.0).max() > _UNSCALED
         ],
         stretch=stretches,
         lying=arms.in_contact if plan.standing else (),
     )
+    if not hands:
+        return motion, []
+    own = [*motion.travel, *motion.arms, *motion.mantle, *motion.widths, *motion.stretch]
+    return motion, further_channels(hands, creature, own, len(moments))
 
 
 def _reduced(plan: MotionPlan, motion: Motion, moments: Floats, every: int) -> Steps[list[Channel]]:
@@ -615,7 +682,7 @@ def _reduced(plan: MotionPlan, motion: Motion, moments: Floats, every: int) -> S
         tolerances or exact,
         every=every,
         dense=tolerances is None,
-        loops=plan.job.in_place,
+        loops=plan.job.in_place and not _has_poses(plan),
     )
 
 

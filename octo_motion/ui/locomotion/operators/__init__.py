@@ -2,7 +2,18 @@
 """The buttons, and what of the panel belongs to each."""
 
 from ...steps import Step, own_classes
-from . import adding, arms, contacts, edits, gait_table, generate, quality, reaches, setups
+from . import (
+    adding,
+    arms,
+    contacts,
+    edits,
+    gait_table,
+    generate,
+    given_poses,
+    quality,
+    reaches,
+    setups,
+)
 from .adding import (
     OCTO_MOTION_OT_add_octopus,
     OCTO_MOTION_OT_add_route,
@@ -14,12 +25,16 @@ from .contacts import OCTO_MOTION_PT_contact, OCTO_MOTION_PT_ground, draw_rest
 from .edits import draw_edits
 from .gait_table import OCTO_MOTION_MT_gait, OCTO_MOTION_MT_gaits, OCTO_MOTION_PT_table
 from .generate import OCTO_MOTION_OT_generate_locomotion
+from .given_poses import OCTO_MOTION_PT_given_poses
 from .quality import OCTO_MOTION_PT_quality
 from .reaches import OCTO_MOTION_PT_along, OCTO_MOTION_PT_change, OCTO_MOTION_PT_reaches
 from .setups import OCTO_MOTION_PT_setups, draw_setups, shown_name
 
 CLASSES = (
-    *own_classes(arms, adding, gait_table, generate, edits, contacts, setups, quality, reaches),
+    *own_classes(
+        *(arms, adding, gait_table, generate, edits, contacts, setups, quality, reaches),
+        given_poses,
+    ),
     OCTO_MOTION_PT_contact,
     OCTO_MOTION_PT_setups,
 )
@@ -44,6 +59,7 @@ __all__ = [
     "OCTO_MOTION_PT_along",
     "OCTO_MOTION_PT_arms",
     "OCTO_MOTION_PT_change",
+    "OCTO_MOTION_PT_given_poses",
     "OCTO_MOTION_PT_ground",
     "OCTO_MOTION_PT_quality",
     "OCTO_MOTION_PT_reaches",

@@ -48,7 +48,7 @@ ORDER: Final = (
 APART: Final = frozenset(
     {
         *("table", "change", "name", "seed", "active_arm", "active_reach", "cycles", "repeat"),
-        *("along", "active_along"),
+        *("along", "active_along", "begin_pose", "end_pose"),
         *("setup", "live", "live_error", "extended_from", "extended_to", "show_targets"),
         *("tell_overlaps", "body_front", "body_up", "root_bone", "spline", "height", "height_mode"),
         *("keep_pose", "body.file_knows", "body.mantle_bone", "body.siphon_bone"),

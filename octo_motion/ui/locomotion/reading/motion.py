@@ -9,7 +9,7 @@ from typing import Any, Final, cast
 import bpy
 import numpy as np
 
-from ....blender.animation import standing_of, writable_object
+from ....blender.animation import read_pose, standing_of, writable_object
 from ....blender.files import load_gait, sample_weight_curve
 from ....blender.rig import LimbReader, arm_skins, may_stretch, radii_of_skin
 from ....blender.scene import (
@@ -36,6 +36,7 @@ from ....core.locomotion.motion import (
     Creature,
     Floor,
     GaitJob,
+    GivenPose,
     GroundJob,
     Timing,
     Tolerances,
@@ -43,9 +44,9 @@ from ....core.locomotion.motion import (
 )
 from ....core.locomotion.path import AlongRoute, TravelSettings, ValuesAlong
 from ....core.locomotion.reaching import Reach, Reaching, Timeline, profile_of
-from ....core.locomotion.rig import frames_of_arm
+from ....core.locomotion.rig import carried_by_root_bone, frames_of_arm
 from ....core.phrases import phrase
-from ....core.rotations import Floats
+from ....core.rotations import IDENTITY, Floats, from_matrix
 from ...declared_settings import read_settings
 from ..settings import (
     ContactEdit,
@@ -241,6 +242,67 @@ def read_changes(
         return ChangesByHeight(settings.height, settings.length, above), names
     places = [ChangeAt(item.position, item.length, numbers[item.gait]) for item in settings.places]
     return tuple(places), names
+
+
+# --- Poses that the motion begins and ends in -----------------------------------------------------
+
+
+def read_given_poses(
+    armature: bpy.types.Object, settings: Any, creature: Creature
+) -> tuple[GivenPose | None, GivenPose | None]:
+    """The poses that a motion begins and ends in; none if there is no action for one."""
+    begin, end = settings.begin_pose, settings.end_pose
+    return (
+        _given_pose(begin, armature, settings, creature),
+        _given_pose(end, armature, settings, creature),
+    )
+
+
+def _given_pose(
+    given: Any, armature: bpy.types.Object, settings: Any, creature: Creature
+) -> GivenPose | None:
+    """One of them.
+
+    Raises:
+        SettingsError: it is one of the motion itself.
+        ClipError: the action has no slot for the armature, or no keys.
+    """
+    if given.action is None:
+        return None
+    if given.action == settings.result:
+        raise SettingsError(
+            phrase(
+                "'{action}' is made anew, and cannot begin or end in a pose of its own.",
+                action=given.action.name,
+            ),
+            "Take the pose with Take Pose: that keeps it.",
+        )
+    bones, world = read_pose(armature, given.action, given.frame)
+    place = None
+    if given.with_place:
+        place = _given_place(bones, world, settings, creature)
+    turns, moves, sizes = (
+        {name: values[kind] for name, values in bones.items()} for kind in range(3)
+    )
+    return GivenPose(turns, moves, sizes, place, given.frames)
+
+
+def _given_place(
+    bones: Mapping[str, tuple[Floats, Floats, Floats]],
+    world: Floats | None,
+    settings: Any,
+    creature: Creature,
+) -> tuple[Floats, Floats] | None:
+    """Where the armature is in a pose, as what travels carries it; none where that says nothing."""
+    if bone := creature.root_bone:
+        turned, moved, _ = bones.get(bone, (IDENTITY, np.zeros(3), None))
+        places = carried_by_root_bone(
+            creature.skeleton, bone, creature.world, moved[None], np.asarray(turned)[None]
+        )
+        return places[0][0], places[1][0]
+    if world is None or settings.travel_on == "NONE":
+        return None
+    return world[:3, 3], from_matrix(world[:3, :3] / creature.scale)
 
 
 # --- What a walk holds on to: the settings, the ground's mesh and the skin of the arms ------------

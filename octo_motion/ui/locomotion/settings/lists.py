@@ -583,6 +583,41 @@ class AlongItem(bpy.types.PropertyGroup):
         return round(value, 6) if self.setting == "HOLD" else value
 
 
+# --- Poses that a motion begins and ends in -------------------------------------------------------
+
+
+class OCTO_MOTION_PG_given_pose(bpy.types.PropertyGroup):
+    """A pose that the motion begins or ends in, ``begin_pose`` and ``end_pose`` of locomotion."""
+
+    action: props.PointerProperty(
+        name="Pose",
+        description="Action that has the pose; without one the motion is its own here. Its keys "
+        "count alone, of bones and of the object",
+        type=bpy.types.Action,
+    )
+    frame: props.FloatProperty(
+        name="Frame",
+        description="Frame of that action, whichever the scene is at",
+        default=1.0,
+        step=100,
+        precision=1,
+    )
+    frames: props.IntProperty(
+        name="Over",
+        description="Frames that it takes from the pose into the motion, or from the motion into "
+        "the pose. Arms that stand on the ground step over one after the other",
+        default=24,
+        min=1,
+        soft_max=200,
+    )
+    with_place: props.BoolProperty(
+        name="Place",
+        description="The body is where it is in that pose, and eases from there to its route. Off, "
+        "it is on its route at once, in that pose",
+        default=True,
+    )
+
+
 # --- Where along the route the gait changes: ``octo_motion.locomotion.change`` --------------------
 
 

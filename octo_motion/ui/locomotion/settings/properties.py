@@ -33,7 +33,14 @@ from .gait import (
     used,
     weight_property,
 )
-from .lists import AlongItem, ArmList, OCTO_MOTION_PG_change, OCTO_MOTION_PG_ground, Reaches
+from .lists import (
+    AlongItem,
+    ArmList,
+    OCTO_MOTION_PG_change,
+    OCTO_MOTION_PG_given_pose,
+    OCTO_MOTION_PG_ground,
+    Reaches,
+)
 
 KINDS: Final = (
     ("SLIP", "Slip", "How far an arm slides over the ground that it holds, in arm lengths", 0),
@@ -505,6 +512,16 @@ class OCTO_MOTION_PG_locomotion(
         name="Change of Gait",
         description="Where along the route the gait changes",
         type=OCTO_MOTION_PG_change,
+    )
+    begin_pose: props.PointerProperty(
+        name="Begin",
+        description="A pose that the motion begins in",
+        type=OCTO_MOTION_PG_given_pose,
+    )
+    end_pose: props.PointerProperty(
+        name="End",
+        description="A pose that the motion ends in",
+        type=OCTO_MOTION_PG_given_pose,
     )
 
 

@@ -55,6 +55,7 @@ from ..reading import (
     read_creature,
     read_floor,
     read_gaits,
+    read_given_poses,
     read_ground,
     read_look,
     read_reaches,
@@ -481,8 +482,7 @@ def generate_locomotion(armature: bpy.types.Object, context: bpy.types.Context) 
 def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: bool = False) -> Shot:
     """Read all that the motion of an armature needs. Nothing is changed, nothing worked out.
 
-    Live, it is to be quick: the same motion with a key on every frame, and without figures of how
-    good it is.
+    Live, it is to be quick: the same with a key on every frame, and no figures of how good it is.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
@@ -500,12 +500,13 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     changes, names = read_changes(settings.change, settings.gait, in_place=in_place)
     gaits = read_gaits(settings, names)
     walks = any(each.settings.gait.on_ground for each in gaits)
+    begin, end = read_given_poses(armature, settings, creature)
     job = MotionJob(
         creature=creature,
         in_place=in_place,
         route=None if in_place else read_route(settings.route, depsgraph, settings.spline),
         cycles=settings.cycles,
-        repeats=in_place and settings.repeat,
+        repeats=in_place and settings.repeat and not (begin or end),
         gaits=gaits,
         changes=changes,
         timing=read_timing(settings, scene.render),
@@ -519,6 +520,8 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         tell_overlaps=settings.tell_overlaps and not live,
         reaching=None,
         tolerances=None if live else tolerances_of(settings),
+        begin=begin,
+        end=end,
         live=live,
         warnings=(*found.warnings, *warnings_for_display(armature, scene.render), *found.poses),
     )
