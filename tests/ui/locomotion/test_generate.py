@@ -527,6 +527,41 @@ def test_all_that_are_selected_move_the_active_one_first(octopus: Any) -> None:
         assert np.array_equal(values, alone[place])
 
 
+def test_copies_that_move_at_once_have_seeds_of_their_own(octopus: Any) -> None:
+    settings_of(octopus).seed = 4
+    plain = keys(generate(octopus))
+    copies = [octopus.copy() for _ in range(2)]
+    for each in copies:
+        bpy.context.scene.collection.objects.link(each)
+        each.select_set(state=True)
+    octopus.select_set(state=True)
+    bpy.context.view_layer.objects.active = octopus
+    assert bpy.ops.octo_motion.generate_locomotion() == {"FINISHED"}
+    # The active one is as it was.
+    assert settings_of(octopus).seed == 4
+    assert all(
+        np.array_equal(each, plain[at]) for at, each in keys(settings_of(octopus).result).items()
+    )
+    assert {settings_of(each).seed for each in copies} == {5, 6}
+    # Each of them is the same again, together or alone.
+    together = keys(settings_of(copies[0]).result)
+    generate(copies[0])
+    alone = keys(settings_of(copies[0]).result)
+    assert all(np.array_equal(each, together[at]) for at, each in alone.items())
+
+
+def test_seeds_stay_where_nothing_is_made(octopus: Any) -> None:
+    other = octopus.copy()
+    bpy.context.scene.collection.objects.link(other)
+    give_route(other, [(0.0, 0.0, 0.0)] * 4)
+    for each in (octopus, other):
+        each.select_set(state=True)
+    bpy.context.view_layer.objects.active = octopus
+    with pytest.raises(RuntimeError):
+        bpy.ops.octo_motion.generate_locomotion()
+    assert settings_of(other).seed == settings_of(octopus).seed
+
+
 def test_if_one_of_several_cannot_move_none_does(octopus: Any) -> None:
     other = make_octopus("Other")
     give_route(other, [(0.0, 0.0, 0.0)] * 4)

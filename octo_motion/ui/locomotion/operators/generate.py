@@ -16,6 +16,7 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
+from itertools import count
 from typing import Any, Final, cast
 
 import bpy
@@ -58,7 +59,7 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
     _shots: Sequence[Shot] = ()
 
     def run(self, context: bpy.types.Context) -> None:
-        self._shots = [prepare(each, context) for each in _meant(context)]
+        self._shots = _prepared(context)
         for _ in make(self._shots):
             pass
         self.conclude(context)
@@ -66,7 +67,7 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[Any]:  # noqa: ARG002
         """Run at once if that is quick, else go on with progress and Esc."""
         try:
-            self._shots = [prepare(each, context) for each in _meant(context)]
+            self._shots = _prepared(context)
         except OctoMotionError as error:
             self.report({"ERROR"}, reported(error))
             return {"CANCELLED"}
@@ -97,6 +98,26 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
         # Blender's status bar keeps the last, which is to be the one that says most.
         for warning in reversed(summary.warnings):
             self.report({"WARNING"}, reported(warning))
+
+
+def _prepared(context: bpy.types.Context) -> list[Shot]:
+    """All that move, each with a seed of its own: a copy is not to breathe with its original.
+
+    The first that has a seed keeps it. Those of others are changed when their motion is written.
+    """
+    shots: list[Shot] = []
+    for each in _meant(context):
+        settings = locomotion_settings(each)
+        before, taken = settings.seed, {shot.seed for shot in shots}
+        own = next(seed for seed in count(before) if seed not in taken)
+        assign(settings, "seed", own)
+        try:
+            shot = prepare(each, context)
+        finally:
+            assign(settings, "seed", before)
+        shot.seed = own
+        shots.append(shot)
+    return shots
 
 
 def _meant(context: bpy.types.Context) -> list[bpy.types.Object]:

@@ -187,6 +187,8 @@ class Shot:
     """What :meth:`write` has made …"""
     told: tuple[str, ...] = ()
     """… and what there is to know of the poses that it found."""
+    seed: int | None = None
+    """The seed that it was made with, if its settings may have another."""
 
     def compute(self) -> Iterator[float]:
         """Do the work in steps, yielding the share that is done: 0…1, 1 at the end."""
@@ -223,6 +225,8 @@ class Shot:
         writable_armature(armature)
         settings = locomotion_settings(armature)
         action = self._write_action(armature, settings, made, unedited=unedited)
+        if self.seed is not None:
+            assign(settings, "seed", self.seed)
         if self.detection is not None:
             # What was moved is what the list shows from now on.
             write_arms(settings, self.detection.arms)
