@@ -9,7 +9,7 @@ import numpy as np
 from octo_motion.core.skeleton import Skeleton
 from octo_motion.core.splicing.clip.clip import Clip
 from octo_motion.core.splicing.transfer.retarget import MappedClip
-from octo_motion.core.splicing.transfer.whole_body import retarget_clip
+from octo_motion.core.splicing.transfer.whole_body import WholeBody, retarget_clip
 from tests.core.rigs import skeleton_of
 from tests.core.splice_bodies import LANDMARKS, humanoid, motion
 
@@ -30,11 +30,12 @@ def with_fingers(skeleton: Skeleton) -> Skeleton:
     )
 
 
-def test_ten_thousand_frames_onto_sixty_bones_take_less_than_three_seconds() -> None:
+def bodies(frames: int) -> tuple[Clip, Clip, Clip]:
+    """One that does nothing, the same for a frame, and a clip."""
     random = np.random.default_rng(1)
-    source = motion(random, with_fingers(humanoid(random)), FRAMES)
+    source = motion(random, with_fingers(humanoid(random)), frames)
     body = with_fingers(humanoid(random, same_proportions=False))
-    rest = np.zeros((FRAMES, BONES, 4))
+    rest = np.zeros((frames, BONES, 4))
     rest[..., 0] = 1.0
     still = Clip(
         "still",
@@ -42,12 +43,38 @@ def test_ten_thousand_frames_onto_sixty_bones_take_less_than_three_seconds() -> 
         source.frames,
         source.rate,
         rest,
-        np.zeros((FRAMES, BONES, 3)),
-        np.broadcast_to(np.eye(4), (FRAMES, 4, 4)).copy(),
+        np.zeros((frames, BONES, 3)),
+        np.broadcast_to(np.eye(4), (frames, 4, 4)).copy(),
     )
-    base = replace(still.taken([0]), name="base")
+    return still, replace(still.taken([0]), name="base"), source
+
+
+def test_ten_thousand_frames_onto_sixty_bones_take_less_than_three_seconds() -> None:
+    still, base, source = bodies(FRAMES)
     begun = time.process_time()
     result = retarget_clip(MappedClip(base, LANDMARKS), still, MappedClip(source, LANDMARKS))
     assert time.process_time() - begun < 3.0
     assert np.isfinite(result.rotations).all()
     assert np.isfinite(result.locations).all()
+
+
+def test_feet_are_held_at_the_clips_rate_whatever_that_of_the_body_is() -> None:
+    still, base, source = bodies(120)
+    # Slow enough for feet to stand.
+    source = replace(source, rate=2.0)
+    still = replace(still, rate=2.0)
+    found = [
+        retarget_clip(
+            MappedClip(replace(base, rate=rate), LANDMARKS), still, MappedClip(source, LANDMARKS)
+        )
+        for rate in (2.0, 24.0)
+    ]
+    loose = retarget_clip(
+        MappedClip(base, LANDMARKS),
+        still,
+        MappedClip(source, LANDMARKS),
+        WholeBody(foot_lock=False),
+    )
+    assert np.abs(found[0].locations - loose.locations).max() > 1e-3
+    np.testing.assert_array_equal(found[0].rotations, found[1].rotations)
+    np.testing.assert_array_equal(found[0].locations, found[1].locations)

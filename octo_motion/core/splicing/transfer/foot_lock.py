@@ -164,7 +164,8 @@ def lock_feet(
     if len(clip) < 2 or not footing.contacts.held.any():
         return clip
     posture = posture_of(clip.skeleton, clip.rotations, clip.locations)
-    paths = foot_paths(mapped, posture, clip.frames, footing.balls)
+    # The clip's own rate counts, not that of the one by which the body is known.
+    paths = foot_paths(replace(mapped, clip=clip), posture, clip.frames, footing.balls)
     rounds = Rounds.between(paths.hips) if footing.cyclic else None
     share = np.ones(len(clip)) if weights is None else weights
     share = (share if rounds is None else repeated(share))[:, None]
