@@ -89,6 +89,8 @@ class OCTO_MOTION_PT_route(_Panel, bpy.types.Panel):
         column = layout.column(align=True)
         column.prop(settings, "ease_in")
         column.prop(settings, "ease_out", text="Out")
+        if settings.table.manner != "SWIM":
+            layout.prop(settings, "stalk")
         if settings.table.manner != "SWIM" and settings.ground.use:
             draw_rest(layout, settings)
 

@@ -31,7 +31,7 @@ NAMES = {
     *("height_mode", "height", "stand", "ground"),
     *("gait", "table", "contraction", "softness", "give", "steady", "sway", "phase_spread"),
     *("turning", "change", "burst", "streamline", "bank_in_turns"),
-    *("uneven", "variation_min", "variation_max", "seed"),
+    *("uneven", "stalk", "variation_min", "variation_max", "seed"),
     *("weight_root", "weight_tip", "use_weight_curve", "weight_curve"),
     *("timing", "cycle_time", "speed", "frame_start", "frame_end"),
     *("travel_on", "extend_scene_range", "keys", "key_angle", "key_distance", "key_columns"),

@@ -49,6 +49,14 @@ _SWOLLEN: Final = 0.04
 """… and the glide before it wider."""
 _HEADED: Final = 0.25
 """Seconds (standard deviation) over which the direction of travel is evened out for them."""
+_GLANCES: Final = 1.8
+"""Seconds for which who stands looks one way …"""
+_HELD: Final = 0.8
+"""… the share of them in which nothing moves …"""
+_ABOUT: Final = 0.35
+"""… and radians to either side at most."""
+_STANDING: Final = 0.05
+"""Arm lengths per second at which a quarter of that is left."""
 _BLINKS: Final = 5.5
 """Seconds from one blink to the next on average …"""
 _BLINK: Final = 0.13
@@ -71,6 +79,8 @@ class SelfMotion:
     """(n,) … and how strongly it lets water out, 0…1."""
     shut: Floats
     """(n, eyes)"""
+    about: Floats
+    """(n,) radians to the left that a body at rest looks about by."""
     way: Floats
     """(n, 3) arm lengths per second: where it goes, without the hurry of each push, as the armature
     has it."""
@@ -124,6 +134,7 @@ def self_motion(
         shut=np.stack([_blinking(track, seed, eye) for eye in range(eyes)], axis=1)
         if eyes
         else np.zeros((len(track.times), 0)),
+        about=_looking_about(track, seed),
         way=track.evened(track.seen(track.velocity), _HEADED),
     )
 
@@ -185,6 +196,20 @@ def _stroke(track: BodyTrack) -> tuple[Floats, Floats]:
     before = np.mod(track.strokes, 1.0)
     swollen = least_jerk((before - 0.45) / 0.25) * (1.0 - least_jerk((before - 0.8) / 0.16))
     return drawn, swollen
+
+
+def _looking_about(track: BodyTrack, seed: int) -> Floats:
+    """Radians (n,) to the left by which who stands looks about: now here, now there."""
+    whole = float(track.times[-1])
+    count = max(round(whole / _GLANCES), 1) if track.cyclic else whole / _GLANCES
+    drawn = np.random.default_rng([seed, 3]).uniform(-_ABOUT, _ABOUT, int(count) + 2)
+    if track.cyclic:
+        drawn[int(count) :] = drawn[0]
+    place = track.times / whole * count
+    number = np.minimum(place.astype(np.int64), len(drawn) - 2)
+    share = least_jerk((place - number - _HELD) / (1.0 - _HELD))
+    still = _STANDING / (track.evened(track.speed[:, None], _HEADED)[:, 0] + _STANDING)
+    return still**2 * (drawn[number] + share * (drawn[number + 1] - drawn[number]))
 
 
 def _blinking(track: BodyTrack, seed: int, eye: int) -> Floats:

@@ -31,6 +31,8 @@ _GLANCE: Final = 0.2
 """Radians that eyes turn to where the body goes at most …"""
 _LOOK: Final = 0.7
 """… and to what they look at."""
+_HEAD_ABOUT: Final = 0.4
+"""Share of looking about that the head does."""
 _SURE: Final = 0.1, 0.4
 """Sine of the angle between gaze and the vertical from which on a slit can be level."""
 _SHUT: Final = 0.9
@@ -161,7 +163,9 @@ class _Posing:
             return whole
         if place:
             return (1.0 - _OF_HEAD) / (many - 1) * whole
-        return _OF_HEAD * whole + motion.at(motion.steady, self._moments.times)
+        about = self._settings.head * _HEAD_ABOUT * motion.at(motion.about, self._moments.times)
+        turned = motion.at(motion.steady, self._moments.times) + about[:, None] * self._up
+        return _OF_HEAD * whole + turned
 
     def _against(self, posed: Floats) -> Floats:
         """Rotation vectors (moments, 3) of the siphon."""
@@ -187,6 +191,10 @@ class _Posing:
             way = way / (np.linalg.norm(way, axis=1, keepdims=True) + _SLOW)
             towards, most = rotate(moments.orientations, way), _GLANCE
         glance = from_rotation_vector(amount * most * np.cross(gaze, towards))
+        if moments.look is None:
+            about = amount * motion.at(motion.about, moments.times)
+            above_it = rotate(moments.orientations, self._up)
+            glance = multiply(from_rotation_vector(about[:, None] * above_it), glance)
         gaze, above = rotate(glance, gaze), rotate(glance, above)
         level = _UP - gaze[:, 2:] * gaze
         roll = np.arctan2(

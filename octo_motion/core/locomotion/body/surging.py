@@ -44,6 +44,11 @@ _PUSHES: Final = 8.0
 """Makes the push of one arm of eight that hold on count 1."""
 _AVERAGE: Final = 0.7
 """Strides over which (standard deviation) what is usual is found."""
+_SHIFTED: Final = 0.012
+"""Arm lengths to either side by which a body that rests in place shifts its weight …"""
+_SHIFTS: Final = 0.5
+"""… and how often in a cycle of its gait."""
+_UPWARD: Final = np.array([0.0, 0.0, 1.0])
 _ENDS: Final = 0.5
 """Strides from where the body starts and stops within which all of it comes and goes."""
 
@@ -131,8 +136,26 @@ def surge(
     table = (share * _held(ahead, _FARTHEST * reach))[:, None] * along
     table[:, 2] += share * _held(reach * up, _HIGHEST * reach)
     if cyclic:
+        resting = amount * max(1.0 - stride / (_STEP * reach), 0.0)
+        table += resting * reach * _shifting(distance / length, length / stride, along)
+    if cyclic:
         table[-1] = table[0]
     return Surge(spacing, table, cyclic)
+
+
+def _shifting(share: Floats, cycles: float, along: Floats) -> Floats:
+    """Arm lengths (n, 3) by which a body that stays shifts its weight, at shares (n,) of a loop:
+    from arms on the one side to those on the other, and a little forth and back.
+    """
+    turn = 2.0 * np.pi * max(round(_SHIFTS * cycles), 1) * share
+    aside = np.cross(_UPWARD, along)
+    lower = 0.5 * _SHIFTED * (np.cos(2.0 * turn) - 1.0)
+    forth = 0.5 * _SHIFTED * np.sin(2.0 * turn + 0.7)
+    return (
+        _SHIFTED * np.sin(turn)[:, None] * aside
+        + forth[:, None] * along
+        + (0.3 * lower[:, None] * _UPWARD)
+    )
 
 
 def _held(values: Floats, most: float) -> Floats:

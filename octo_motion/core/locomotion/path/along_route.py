@@ -59,6 +59,32 @@ class ValuesAlong:
         return values[before] + least_jerk(part) * (values[before + 1] - values[before])
 
 
+@dataclass(frozen=True)
+class Stalking:
+    """A pace that nearly comes to a stop at places evenly apart, not at the ends."""
+
+    pace: ValuesAlong | None
+    """In between; none for 1."""
+    legs: int
+    """From stop to stop, on all of the route."""
+    within: float
+    """Share of the route before and after each stop within which it slows down and gets going."""
+    amount: float
+    """1 for stops of which hardly a pace is left, 0 for none."""
+
+    def at(self, share: ArrayLike) -> Floats:
+        """The pace at shares (…,) of the route."""
+        wanted = np.asarray(share, dtype=np.float64)
+        nearest = np.clip(np.rint(wanted * self.legs), 1, max(self.legs - 1, 1)) / self.legs
+        away = np.abs(wanted - nearest) / self.within if self.legs > 1 else np.ones(wanted.shape)
+        slow = self.amount * _STOPPED * (1.0 - least_jerk(away))
+        return (1.0 - slow) * (1.0 if self.pace is None else self.pace.at(wanted))
+
+
+_STOPPED: Final = 0.94
+"""Share of the pace that a stop takes."""
+
+
 @dataclass(frozen=True, eq=False)
 class PacedTime:
     """How a route is come through whose pace differs along it.
@@ -67,7 +93,7 @@ class PacedTime:
     of a time ``u``, p being its pace there and m the mean of 1/p: what it is slower by.
     """
 
-    pace: ValuesAlong
+    pace: ValuesAlong | Stalking
     distances: Floats
     """(n,) shares of the route's length at even steps of the parameter, from 0 to 1."""
 

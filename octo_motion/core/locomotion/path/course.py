@@ -194,7 +194,7 @@ def route_in_place(stride: float, cycles: int) -> Route:
 
 def travel_in_place(travel: TravelSettings) -> TravelSettings:
     """The same gait at even speed from the first frame to the last, everywhere the same."""
-    return replace(travel, speed="EVEN", ease_in=0.0, ease_out=0.0, along=AlongRoute())
+    return replace(travel, speed="EVEN", ease_in=0.0, ease_out=0.0, stalk=0.0, along=AlongRoute())
 
 
 def whole_frames(frames: float) -> float:

@@ -30,7 +30,7 @@ from ...rotations import (
 from ...settings import check_settings, setting, share_setting
 from ...smoothing import smooth_step
 from ..gait import CYCLE
-from .along_route import PacedTime, ValuesAlong
+from .along_route import PacedTime, Stalking, ValuesAlong
 from .route import Route
 
 _FEWEST: Final = 1024
@@ -418,6 +418,11 @@ class TravelSettings:
     )
     stroke_phase: float = 0.75 * np.pi
     """SWIM: phase of the middle of the power stroke. In the table β₁ falls from π/2 to π."""
+    stalk: float = share_setting(
+        "Stalk",
+        "Walking: go, stop in the middle of a step, look about, go on. 0 goes evenly",
+        default=0.0,
+    )
     look_ahead: float = setting(
         "Look Ahead",
         "How many strides ahead the body looks for the turn that its arms prepare",
@@ -585,15 +590,23 @@ def duration(route: Route, settings: TravelSettings, metres_per_second: float) -
     return slower * route.length / (metres_per_second * _mean_speed(settings))
 
 
+_LEG: Final = 1.6
+"""Strides from stop to stop of a body that stalks …"""
+_HALT: Final = 0.1
+"""… and before and after a stop within which it slows down and gets going again."""
 _PACED: Final = 4096
 """Steps of the table of a pace that differs along the route."""
 
 
 def paced_time(route: Route, settings: TravelSettings) -> PacedTime | None:
     """How a route is come through on which the pace differs; none where it does not."""
-    if settings.along.pace is None:
+    pace, stalk = settings.along.pace, settings.stalk if settings.manner == "WALK" else 0.0
+    if stalk > 0.0:
+        legs = max(round(route.length / (_LEG * settings.stride)), 1)
+        pace = Stalking(pace, legs, _HALT * settings.stride / route.length, stalk)
+    if pace is None:
         return None
-    return PacedTime(settings.along.pace, _share_of_way(route, settings, np.linspace(0, 1, _PACED)))
+    return PacedTime(pace, _share_of_way(route, settings, np.linspace(0, 1, _PACED)))
 
 
 def _share_of_way(route: Route, settings: TravelSettings, parameter: Floats) -> Floats:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Rests on the spot and breathes; arms curl a little.
+# Rests on the spot and breathes, shifts its weight and explores with its tips.
 import bpy
 
 active = bpy.context.object

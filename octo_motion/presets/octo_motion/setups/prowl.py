@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Low and slow, the arms close to the ground.
+# Low and slow, the arms close to the ground: it goes, stops, looks about, goes on.
 import bpy
 
 active = bpy.context.object
@@ -7,10 +7,11 @@ armature = active if active.type == "ARMATURE" else active.find_armature()
 settings = armature.octo_motion.locomotion
 
 settings.gait = "prowl"
-settings.cycle_time = 3.6
+settings.cycle_time = 4.2
 settings.ground.duty = 0.65
 settings.ground.lift = 0.03
 settings.ground.planted = 0.3
 settings.ground.smoothing = 0.25
 settings.variation_min = -0.1
 settings.variation_max = 0.1
+settings.stalk = 0.9

@@ -8,6 +8,7 @@ it goes, over which ground, in which frames and with which keys are not part of 
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -63,6 +64,8 @@ gait goes as a whole."""
 
 _ON_THE_SPOT: Final = frozenset({"idle", "curl"})
 """Gaits of set-ups that stay where they are."""
+_BACKWARDS: Final = frozenset({"tiptoe"})
+"""Gaits of set-ups that go backwards."""
 _SINGLE: Final = frozenset({"BOOLEAN", "INT", "FLOAT", "STRING", "ENUM"})
 
 
@@ -150,12 +153,14 @@ class OCTO_MOTION_OT_setup_load(ArmatureOperator, bpy.types.Operator):
                 phrase("Choose one of {names}.", names=", ".join(paths)),
             )
         settings: Any = locomotion_settings(armature)
-        owned = ("travel_on", "gait", *governed())
+        owned = ("travel_on", "heading_angle", "gait", *governed())
         before = {path: settings.path_resolve(path) for path in owned}
         table = plain(settings.table, without=frozenset({"as_text"}))
         if settings.travel_on == "NONE" and settings.gait in _ON_THE_SPOT:
             # It stayed because of the set-up before.
             settings.travel_on = "OBJECT"
+        if settings.gait in _BACKWARDS and abs(abs(settings.heading_angle) - math.pi) < 1e-3:
+            settings.heading_angle = 0.0
         reset(settings)
         try:
             # The file is about the active object, which may as well be a route or a marker.

@@ -247,6 +247,7 @@ class RouteSettings:
     )
     speed_mode: declared(TravelSettings, "speed")
     ease_in: declared(TravelSettings, "ease_in")
+    stalk: declared(TravelSettings, "stalk")
     ease_out: declared(TravelSettings, "ease_out")
     heading: declared(TravelSettings, "heading")
     heading_angle: declared(TravelSettings, "heading_angle")
