@@ -17,7 +17,14 @@ import numpy as np
 from ..core.posing.balance import keep_balance
 from ..core.posing.picking import nearest_body
 from ..core.posing.puppet import Figure, Pose, bodies_with, capsules_in_world, part_of
-from ..core.posing.session import HandSample, Session, StepLength, TickReport
+from ..core.posing.session import (
+    LONGEST_TICK,
+    LONGEST_WORK,
+    HandSample,
+    Session,
+    StepLength,
+    TickReport,
+)
 from ..core.posing.solver import Coupling, HandSpring, World, WorldSettings
 from ..core.rotations import Floats, conjugate, multiply, rotate
 from ..core.rotations.scalars import Vector
@@ -55,6 +62,8 @@ _EXPECTED: Final = 0.1
 """Of one more turn, in what is expected of the next: one late turn alone is no slow simulation."""
 _AT_ONCE: Final = 5
 """Steps in a turn, at most: after a longer pause the puppet is not hurried."""
+_PARTS: Final = 5
+"""In which the time that a long redraw took is simulated, at most: what is longer is a pause."""
 _LATE: Final = 1.5
 """Times the expected turn, before the next one counts as late."""
 _STALE: Final = 0.25
@@ -204,10 +213,19 @@ class Simulation:
             # They go there within the time that the next tick takes to come.
             self._own_way, self._own_time = samples, message.seconds
             return TickReport(0.0, 0, self.pace, self.step_seconds, resting=session.resting)
-        keep_balance(session, self._balanced)
-        report = session.tick(message.seconds, samples)
-        self.steps += report.steps
-        return report
+        # A redraw may take long: physics does not wait for it, as long as it keeps up itself.
+        count = min(max(1, math.ceil(message.seconds / LONGEST_TICK - 1e-9)), _PARTS)
+        begun, simulated, steps = self._clock(), 0.0, 0
+        report = TickReport(0.0, 0, 1.0, self.step_seconds, resting=session.resting)
+        for left in range(count, 0, -1):
+            keep_balance(session, self._balanced)
+            ways = {spring: replace(way, share=1.0 / left) for spring, way in samples.items()}
+            report = session.tick(message.seconds / count, ways)
+            simulated, steps = simulated + report.simulated, steps + report.steps
+            if self._clock() - begun > LONGEST_WORK:
+                break
+        self.steps += steps
+        return replace(report, simulated=simulated, steps=steps)
 
     def _samples(self, simulated: float) -> dict[HandSpring, HandSample]:
         """Where all hands are that hold something, after so many seconds of their way."""

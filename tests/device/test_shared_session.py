@@ -234,6 +234,25 @@ def test_bridge_that_is_slow_is_asked_once_and_gets_all_the_time() -> None:
     assert last.seconds == pytest.approx(10.0 * TICK)
 
 
+def test_redraw_that_takes_long_does_not_slow_the_puppet_down() -> None:
+    """Blender by itself makes up for 0.1 s at most: it would stand still for longer and longer."""
+    pair = Pair()
+    pair.grab(9)
+    target = np.add(pair.shared.pose.positions[9], [0.1, 0.0, 0.1])
+    hand = pair.held[1]
+    before = pair.shared.time
+    for _ in range(4):
+        pair.shared.tick(0.3, {hand: HandSample(target, IDENTITY)})
+        pair.answer()
+    report = pair.shared.tick(0.0)
+    assert report.simulated == pytest.approx(0.3, abs=5e-3)
+    assert pair.shared.time - before == pytest.approx(1.2, abs=0.02)
+    np.testing.assert_allclose(hand.target_position, target)
+    assert pair.bridge.simulation
+    (there,) = pair.bridge.simulation.own.values()
+    np.testing.assert_allclose(there.target_position, target)
+
+
 def test_mouse_and_device_hold_two_limbs_of_one_session() -> None:
     """The device's hand keeps time by itself; the mouse's goes to where it is between ticks."""
     pair = Pair(chain(6, elements=soft(6, 40.0, 2.0, 100.0, 1.0)))

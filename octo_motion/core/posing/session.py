@@ -124,10 +124,10 @@ class _Sweep:
 
     @classmethod
     def towards(cls, spring: HandSpring, hand: HandSample, share: float, seconds: float) -> _Sweep:
-        """A share of the way to where a hand is; if not the whole one, in so many seconds."""
-        way = hand.position - spring.target_position
+        """A share of the hand's way to where it is; if not the whole one, in so many seconds."""
+        way = hand.share * (hand.position - spring.target_position)
         turned = spring.target_orientation
-        swing = to_rotation_vector(
+        swing = hand.share * to_rotation_vector(
             multiply(hand.orientation, conjugate(IDENTITY if turned is None else turned))
         )
         if turned is None and swing.any():
@@ -302,9 +302,7 @@ class Session:
         """
         world, passed = self.world, count * self.world.settings.step
         sweeps = [
-            _Sweep.towards(spring, hand, share * hand.share, passed)
-            for spring, hand in hands.items()
-            if count
+            _Sweep.towards(spring, hand, share, passed) for spring, hand in hands.items() if count
         ]
         for number in range(1, count + 1):
             for sweep in sweeps:
