@@ -137,6 +137,20 @@ def carried_by_object(person: Played) -> Played:
     return replace(person, poses=poses, world=person.world @ way)
 
 
+def on_a_root(person: Played) -> Played:
+    """With a bone on the ground that carries the whole, and its way."""
+    way = np.broadcast_to(np.eye(4), person.world.shape).copy()
+    way[:, :2, 3] = person.poses[:, 0, :2, 3]
+    return replace(
+        person,
+        names=["root", *person.names],
+        parents=[-1, *(max(each, -1) + 1 for each in person.parents)],
+        rest=np.concatenate([np.eye(4)[None], person.rest]),
+        poses=np.concatenate([way[:, None], person.poses], axis=1),
+        lengths=np.concatenate([person.lengths[:1], person.lengths]),
+    )
+
+
 def build(person: Played, name: str, modes: tuple[str, ...] = ("QUATERNION",)) -> Any:
     """An armature with an action in the scene."""
     scene: Any = bpy.context.scene
@@ -328,6 +342,7 @@ CHANGES: dict[str, Callable[[Played, Path], Copy]] = {
     "hundredfold": _placed(_scaled(100.0)),
     "a hundredth": _placed(_scaled(0.01)),
     "elsewhere": _placed(ELSEWHERE),
+    "on a root": _with(on_a_root),
     "way on the object": _with(carried_by_object),
     "before 0": _at(-20.0),
     "on half frames": _at(1000.5),
