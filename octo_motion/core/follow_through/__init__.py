@@ -5,7 +5,7 @@ from .chains import Chain, between, chains_of, find_loose
 from .limbs import Followed, Limbs, limbs_of, own_rotations
 from .sampling import BoneMotion, Displacement, displacement
 from .settings import MATERIALS, MEDIA, STARTS, FollowSettings
-from .simulation import STEPS, BodyCapsules, FollowJob, Simulation, follow
+from .simulation import STEPS, BodyCapsules, FollowJob, MovingObstacles, Simulation, follow
 
 __all__ = [
     "MATERIALS",
@@ -20,6 +20,7 @@ __all__ = [
     "FollowSettings",
     "Followed",
     "Limbs",
+    "MovingObstacles",
     "Simulation",
     "between",
     "chains_of",

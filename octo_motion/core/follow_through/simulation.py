@@ -9,6 +9,7 @@ to, or baked.
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,7 +17,14 @@ import numpy as np
 
 from ..errors import SettingsError
 from ..posing.puppet import Figure, Flags, Pose, capsules_in_world
-from ..posing.solver import CarriedCapsules, CarriedWorld, Leading, Obstacle, WorldSettings
+from ..posing.solver import (
+    CarriedCapsules,
+    CarriedThings,
+    CarriedWorld,
+    Leading,
+    Obstacle,
+    WorldSettings,
+)
 from ..rotations import (
     IDENTITY,
     Floats,
@@ -68,6 +76,29 @@ class BodyCapsules:
 
 
 @dataclass(frozen=True, eq=False)
+class MovingObstacles:
+    """Things that limbs may touch, and that go their own way."""
+
+    shapes: tuple[Obstacle, ...]
+    ways: BoneMotion
+    """(frames, shapes): where they are at the frames of the action."""
+
+    def at(self, ways: BoneMotion, row: int, step: float) -> CarriedThings:
+        """The things where they are at a moment, on their way to the next, in seconds."""
+        found: list[Obstacle] = []
+        shifts = np.diff(ways.positions[row : row + 2], axis=0)[0]
+        before, after = ways.orientations[row : row + 2]
+        turns = to_rotation_vector(multiply(after, conjugate(before)))
+        for number, shape in enumerate(self.shapes):
+            # What hangs on the shape alone is kept.
+            thing = copy(shape)
+            object.__setattr__(thing, "position", ways.positions[row, number])
+            object.__setattr__(thing, "orientation", ways.orientations[row, number])
+            found.append(thing)
+        return CarriedThings(found, np.stack([shifts, turns], axis=1) / step)
+
+
+@dataclass(frozen=True, eq=False)
 class FollowJob:
     """All that a simulation is made from; lengths are metres of the figure's own scale."""
 
@@ -80,6 +111,7 @@ class FollowJob:
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """m/s"""
     obstacles: Sequence[Obstacle] = ()
+    moving: MovingObstacles | None = None
     body: BodyCapsules | None = None
     strengths: Floats | None = None
     """(frames, bones) or (1, bones) factors on the strength of each."""
@@ -128,6 +160,11 @@ class Simulation:
         if job.body is not None and len(job.body.bones):
             own = motion.of(list(job.body.bones))
             self._around = Sampler(own, cycle=job.cycle, still=still)
+        self._things: Sampler | None = None
+        if job.moving is not None:
+            # Whatever the body goes round, things are where they are.
+            stays = Displacement(IDENTITY, np.zeros(3)) if job.cycle is not None else None
+            self._things = Sampler(job.moving.ways, cycle=stays, still=still)
         first = 0 if job.cycle is not None else -round(BEFORE / self.step)
         self._world = self._begin(first)
         self._known: dict[int, Floats] = {}
@@ -224,6 +261,7 @@ class Simulation:
         led = self._sampler.at(times)
         leading = self._leading(led)
         ends = None if self._around is None else self._ends(self._around.at(times))
+        things = None if self._things is None else self._things.at(times)
         world, count = self._world, self.roots
         world.put(Pose(led.positions[0, :count], led.orientations[0, :count]))
         for number, each in enumerate(leading):
@@ -236,6 +274,9 @@ class Simulation:
                 world.capsules = CarriedCapsules(
                     ends[number], self.job.body.radii, speeds, self._meets, self._slack
                 )
+            if things is not None:
+                assert self.job.moving is not None
+                world.things = self.job.moving.at(things, number, self.step)
             if self._medium.acts:
                 world.forces = self._medium.forces(world.velocities(), world.matrices)
             world.step()

@@ -24,7 +24,7 @@ from ...blender.animation import (
     write_spliced,
 )
 from ...blender.rig import LimbReader, is_part_of, pose_of, read_skeleton, selected_bones
-from ...blender.scene import read_obstacle
+from ...blender.scene import may_move, read_obstacle, read_places
 from ...core.errors import ClipError, RigError, WriteError
 from ...core.follow_through import (
     BodyCapsules,
@@ -33,6 +33,7 @@ from ...core.follow_through import (
     FollowJob,
     FollowSettings,
     Limbs,
+    MovingObstacles,
     between,
     chains_of,
     displacement,
@@ -43,7 +44,7 @@ from ...core.follow_through import (
 from ...core.keyframes import Channel, Limb, Track, reducing
 from ...core.phrases import phrase
 from ...core.posing.solver import Obstacle, OneThread, Plane
-from ...core.rotations import Floats, from_matrix
+from ...core.rotations import Floats, conjugate, from_matrix, multiply, rotate
 from ...core.skeleton import Skeleton
 from ...core.splicing.clip import Clip
 from ..declared_settings import plain, read_settings
@@ -269,13 +270,15 @@ def _read(armature: bpy.types.Object) -> _Read:
     motion = BoneMotion(clip.rate, reader.unit * heads, orientations)
     root = [*skeleton.ancestors(limbs.bones[0]), limbs.bones[0]]
     cyclic = settings.loop and clip.cyclic
+    still, things = _obstacles(armature, settings, reader.unit)
     job = FollowJob(
         limbs,
         reader.figure(limbs.bones, limbs.parents),
         motion,
         read_settings(FollowSettings, settings),
         wind=tuple(reader.unit * each for each in settings.wind),
-        obstacles=_obstacles(armature, settings, reader.unit),
+        obstacles=still,
+        moving=_moving(things, clip, reader.unit),
         body=BodyCapsules(*reader.rest_of_body(limbs.bones)) if settings.body else None,
         strengths=_strengths(armature, limbs, chains, clip.frames, (base, slot)),
         cycle=displacement(motion, root[max(len(root) - 2, 0)]) if cyclic else None,
@@ -356,16 +359,44 @@ def _strengths(
     return None if (result == 1.0).all() else result
 
 
-def _obstacles(armature: bpy.types.Object, settings: Any, unit: float) -> list[Obstacle]:
+def _obstacles(
+    armature: bpy.types.Object, settings: Any, unit: float
+) -> tuple[list[Obstacle], list[tuple[bpy.types.Object, Obstacle]]]:
+    """What stands in the way, and objects that may move, as they are now."""
     scene = bpy.context.scene
     assert scene is not None
     found: list[Obstacle] = []
+    things: list[tuple[bpy.types.Object, Obstacle]] = []
     if settings.floor:
         found.append(Plane(position=np.array([0.0, 0.0, unit * settings.floor_height])))
     for item, kind in marked_obstacles(scene) if settings.use_obstacles else ():
-        if not is_part_of(item, armature):
-            found.append(read_obstacle(item, kind, unit))
-    return found
+        if is_part_of(item, armature):
+            continue
+        shape = read_obstacle(item, kind, unit)
+        if may_move(item):
+            things.append((item, shape))
+        else:
+            found.append(shape)
+    return found, things
+
+
+def _moving(
+    things: list[tuple[bpy.types.Object, Obstacle]], clip: Clip, unit: float
+) -> MovingObstacles | None:
+    """Things as they move over the frames of the action; none where there are none."""
+    scene = bpy.context.scene
+    if not things or scene is None:
+        return None
+    frames = np.append(clip.frames, scene.frame_current_final)
+    positions, orientations = list[Floats](), list[Floats]()
+    for item, shape in things:
+        places, turns = read_places(item, frames)
+        by = multiply(turns[:-1], conjugate(turns[-1]))
+        apart = shape.position - unit * places[-1]
+        positions.append(unit * places[:-1] + rotate(by, apart))
+        orientations.append(multiply(by, shape.orientation))
+    ways = BoneMotion(clip.rate, np.stack(positions, axis=1), np.stack(orientations, axis=1))
+    return MovingObstacles(tuple(shape for _, shape in things), ways)
 
 
 def follow_action(armature: bpy.types.Object) -> FollowSummary:

@@ -88,7 +88,8 @@ class OCTO_MOTION_PG_follow_through(Floor, FollowPhysics, bpy.types.PropertyGrou
     )
     use_obstacles: props.BoolProperty(
         name="Obstacles",
-        description="Objects that are marked as solid for posing stop the bones: as they stand now",
+        description="Objects that are marked as solid for posing stop the bones and push them, as "
+        "they move",
         default=True,
     )
     body: props.BoolProperty(

@@ -13,15 +13,17 @@ from octo_motion.core.errors import OctoMotionError
 from octo_motion.core.follow_through import (
     STEPS,
     BodyCapsules,
+    BoneMotion,
     Displacement,
     Followed,
     FollowJob,
     FollowSettings,
+    MovingObstacles,
     Simulation,
     displacement,
     follow,
 )
-from octo_motion.core.posing.solver import Plane
+from octo_motion.core.posing.solver import Plane, Sphere
 from octo_motion.core.rotations import (
     Floats,
     angle_between,
@@ -320,3 +322,26 @@ def test_what_makes_no_sense_is_refused(
 ) -> None:
     with pytest.raises(OctoMotionError, match=told):
         Simulation(change(tail_job()))
+
+
+def test_tail_is_pushed_aside_by_a_ball_that_passes() -> None:
+    """It moves at a metre a second, right through where the tail stands."""
+    ball, radius = 0.05, RADIUS
+    job = tail_job(seconds=2.0)
+    times = np.arange(len(job.motion)) / job.motion.rate
+    places = np.stack([0.0 * times + 0.35, times - 0.5, 0.0 * times], axis=1)[:, None]
+    turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1, 1))
+    things = MovingObstacles((Sphere(radius=ball),), BoneMotion(job.motion.rate, places, turns))
+    job = replace(job, moving=things)
+    simulated = done(job)
+    found = joints(job, simulated)
+    shares = np.linspace(0.0, 1.0, 21)[:, None]
+    axes = found[:, :-1, None] + shares * (found[:, 1:] - found[:, :-1])[:, :, None]
+    apart = np.linalg.norm(axes - places[:, :, None], axis=-1).min(axis=(1, 2))
+    assert apart.min() > ball + radius - 2e-3
+    tip = found[:, -1, 1]
+    assert tip.max() > 0.1  # it is taken along …
+    assert abs(tip[-1]) < 0.05  # … and comes back
+    # Whoever asks for a frame first, it is the same.
+    alone = Simulation(job).at(20.0)[1:]
+    np.testing.assert_allclose(alone, simulated.orientations[20], atol=1e-9)

@@ -290,3 +290,27 @@ def test_frame_and_pose_are_left_as_they_were() -> None:
     fox.pose.bones["Tail.2"].location = (0.0, 0.0, 0.0)
     bpy.ops.octo_motion.follow_through()
     assert bpy.context.scene.frame_current == 7
+
+
+def test_what_moves_pushes_the_tail_where_it_then_is() -> None:
+    """A ball goes up through the place where the tail hangs; where it stands now says nothing."""
+    fox = make_fox()
+    mesh = bpy.data.meshes.new("Ball")
+    mesh.from_pydata([(0.1 * x, 0.1 * y, 0.1 * z) for x, y, z in CORNERS], [], [])
+    ball: Any = bpy.data.objects.new("Ball", mesh)
+    bpy.context.scene.collection.objects.link(ball)
+    for frame, height in ((1, -0.5), (25, 1.5)):
+        ball.location = (0.0, 0.6, height)
+        ball.keyframe_insert("location", frame=frame)
+    ball.octo_motion.posing.obstacle = "SPHERE"
+    select_tail(fox)
+    settings: Any = follow_settings(fox)
+    settings.use_obstacles = True
+    bpy.context.scene.frame_set(1)
+    bpy.ops.octo_motion.follow_through()
+    heights = played(fox)[..., 2, 3]
+    assert heights.max() > 0.6  # the tail is level at 0.5 without
+    np.testing.assert_allclose(heights[0], 0.5, atol=0.01)
+
+
+CORNERS = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]

@@ -2,7 +2,7 @@
 """What moves a puppet: one step of a rigid-body world with plastic joints and contacts."""
 
 from .blas_threads import OneThread
-from .carried_world import CarriedWorld, Leading
+from .carried_world import CarriedThings, CarriedWorld, Leading
 from .contact_detection import CarriedCapsules
 from .holds import Coupling, HandSpring
 from .obstacle_shapes import (
@@ -21,6 +21,7 @@ __all__ = [
     "Box",
     "Capsule",
     "CarriedCapsules",
+    "CarriedThings",
     "CarriedWorld",
     "Coupling",
     "HandSpring",

@@ -37,6 +37,16 @@ class Leading:
     """… (bodies, 4) and by what within the step."""
 
 
+@dataclass(frozen=True, eq=False)
+class CarriedThings:
+    """Obstacles that something else moves, whatever touches them."""
+
+    shapes: Sequence[Obstacle]
+    """Where they are now."""
+    speeds: Floats
+    """(things, 2, 3) m/s of their origins, and rad/s, world."""
+
+
 class CarriedWorld(World):
     """A world whose roots are carried from step to step."""
 
@@ -58,6 +68,8 @@ class CarriedWorld(World):
         self._detector = Detector(figure, self_collision=self.settings.self_collision, stands=pose)
         self.capsules: CarriedCapsules | None = None
         """What else may be touched, and is moved; to be replaced before each step."""
+        self.things: CarriedThings | None = None
+        """Obstacles that something else moves; likewise."""
         self._leading: Leading | None = None
         self._driven: Floats | None = None
 
@@ -91,13 +103,34 @@ class CarriedWorld(World):
 
     def _find(self) -> Contacts:
         found = super()._find()
+        for more in (self._met(), self._touched()):
+            found = joined_contacts((found, more)) if more is not None and len(more) else found
+        return found
+
+    def _margin(self, speeds: Floats) -> float:
+        fastest = float(np.abs(speeds).max()) + float(np.abs(self._bodies.linear).max())
+        return 2e-3 * self._size + 2.0 * self.settings.step * fastest
+
+    def _met(self) -> Contacts | None:
+        """Contacts with capsules that are carried."""
         if self.capsules is None or not len(self.capsules.radii):
-            return found
-        bodies, speeds = self._bodies, self.capsules.speeds
-        fastest = float(np.abs(speeds).max()) + float(np.abs(bodies.linear).max())
-        margin = 2e-3 * self._size + 2.0 * self.settings.step * fastest
-        more = self._detector.find_carried(bodies.positions, bodies.matrices, self.capsules, margin)
-        return joined_contacts((found, more)) if len(more) else found
+            return None
+        bodies, margin = self._bodies, self._margin(self.capsules.speeds)
+        return self._detector.find_carried(bodies.positions, bodies.matrices, self.capsules, margin)
+
+    def _touched(self) -> Contacts | None:
+        """Contacts with obstacles that are carried."""
+        things, bodies = self.things, self._bodies
+        if things is None:
+            return None
+        margin = self._margin(things.speeds)
+        found = self._detector.find_solids(bodies.positions, bodies.matrices, things.shapes, margin)
+        parts = list[Contacts]()
+        for each, shape, (shift, turn) in zip(found, things.shapes, things.speeds, strict=True):
+            if each is not None and len(each):
+                speeds = shift + np.cross(turn, each.points - shape.position)
+                parts.append(replace(each, speeds=speeds))
+        return joined_contacts(parts) if parts else None
 
     def _move(self, problem: Problem, solution: Solution) -> None:
         if self._leading is not None:

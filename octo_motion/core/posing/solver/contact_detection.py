@@ -19,7 +19,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ...rotations import Floats, rotate
+from ...rotations import Floats, rotate, to_matrix
 from ..puppet import Figure, Flags, Integers, Pose, capsules_in_world, rest_pose
 from .moving_shapes import MovingShapes, Placed, Touches, placed
 from .obstacle_shapes import Box, Hull, Obstacle, Plane, nearest_on_segments
@@ -183,6 +183,23 @@ class Detector:
         self._planes.clear()
         pairs = self._all_pairs
         self._pairs = pairs if pairs is None or not bodies else pairs & bare & bare[:, None]
+
+    def find_solids(
+        self, positions: Floats, matrices: Floats, solids: Sequence[Obstacle], margin: float
+    ) -> list[Contacts | None]:
+        """The same with each of some solids that something else moves."""
+        ends = self._ends @ matrices.transpose(0, 2, 1)
+        ends += positions[:, None]
+        boxes, found = self._boxes(ends, margin), list[Contacts | None]()
+        label = self._first_label + _BEYOND
+        for each in solids:
+            if isinstance(each, Plane):
+                found.append(self._on_plane(ends, each, margin, label))
+            else:
+                there = placed(each, -1, to_matrix(each.orientation), each.position)
+                found.append(self._on_solid(ends, boxes, there, margin, label))
+            label += 3 * len(self._radii)
+        return found
 
     def find_carried(
         self, positions: Floats, matrices: Floats, carried: CarriedCapsules, margin: float
@@ -479,4 +496,6 @@ def _joined(found: list[Contacts]) -> Contacts:
     return replace(Contacts(*columns), speeds=speeds)
 
 
+_BEYOND: Final = 1 << 50
+"""Labels from there on are those of solids that are carried."""
 _AROUND: Final = np.linspace(-1.0, 1.0, 7)
