@@ -153,8 +153,7 @@ def _going_on(track: BodyTrack, drift: Floats) -> Floats:
     width = _QUICK / track.step
     margin = min(int(4.0 * width), len(drift) - 1)
     wide = np.pad(drift, ((margin, margin), (0, 0)), mode="reflect", reflect_type="odd")
-    columns = [evened(each, width, cyclic=False) for each in wide.T]
-    return np.stack(columns, axis=-1)[margin : margin + len(drift)]
+    return evened(wide, width, cyclic=False)[margin : margin + len(drift)]
 
 
 def _breathing(

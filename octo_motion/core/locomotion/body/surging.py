@@ -168,7 +168,6 @@ def _pushes(holds: Holds, distance: Floats, loop: float | None) -> tuple[Floats,
 
     An arm's push rises from nothing and falls to nothing, without a corner.
     """
-    pushed, down = np.zeros(len(distance)), np.zeros(len(distance))
     weights = 1.0 - _BEHIND * 0.5 * (1.0 - holds.behind)
     every = np.stack([holds.start, holds.end, weights], axis=1)
     if loop is not None:
@@ -177,11 +176,17 @@ def _pushes(holds: Holds, distance: Floats, loop: float | None) -> tuple[Floats,
         once = every[(middle >= 0.0) & (middle < loop)]
         round_it = np.array([loop, loop, 0.0])
         every = np.concatenate([once - round_it, once, once + round_it])
-    for start, end, weight in every.tolist():
-        first, last = np.searchsorted(distance, [start, end]).tolist()
-        share = (distance[first:last] - start) / max(end - start, 1e-9)
-        pushed[first:last] += weight * (4.0 * share * (1.0 - share)) ** 3
-        down[first:last] += least_jerk(8.0 * share) * least_jerk(8.0 * (1.0 - share))
+    # All places of all holds, one hold after the other.
+    first, last = np.searchsorted(distance, every[:, 0]), np.searchsorted(distance, every[:, 1])
+    many = np.maximum(last - first, 0)
+    place = np.arange(many.sum()) + np.repeat(first - np.cumsum(many) + many, many)
+    start, end, weight = np.repeat(every, many, axis=0).T
+    share = (distance[place] - start) / np.maximum(end - start, 1e-9)
+    pushing = weight * (4.0 * share * (1.0 - share)) ** 3
+    holding = least_jerk(8.0 * share) * least_jerk(8.0 * (1.0 - share))
+    pushed, down = (
+        np.bincount(place, weights=each, minlength=len(distance)) for each in (pushing, holding)
+    )
     return pushed, down
 
 

@@ -52,9 +52,7 @@ class BodyTrack:
 
     def evened(self, values: Floats, seconds: float) -> Floats:
         """Values (n, k) evened out over time (standard deviation)."""
-        width = seconds / self.step
-        columns = [evened(each, width, cyclic=self.cyclic) for each in values.T]
-        return np.stack(columns, axis=-1)
+        return evened(values, seconds / self.step, cyclic=self.cyclic)
 
     @cached_property
     def velocity(self) -> Floats:

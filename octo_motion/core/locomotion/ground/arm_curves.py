@@ -145,9 +145,9 @@ def _resting(
     points = points[..., :2]
     slope = ground.slope(points)
     steep = np.minimum(np.sum(slope * slope, axis=-1), _STEEPEST**2)
-    height = ground.height(points)
     half = 0.5 * bones[..., None] * ahead
-    chord = 0.5 * (ground.height(points + half) + ground.height(points - half))
+    height, before, behind = ground.height(np.stack([points, points + half, points - half]))
+    chord = 0.5 * (before + behind)
     return height + np.maximum(height - chord, 0.0) + radius * np.sqrt(1.0 + steep)
 
 

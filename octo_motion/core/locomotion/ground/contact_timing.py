@@ -306,10 +306,12 @@ class TabledTiming:
 
     def distances(self, arms: Sequence[int], cycles: Floats) -> Floats:
         """(arms, …)."""
-        since = cycles - self.middle / CYCLE
-        return np.stack(
-            [self.tables[arm].distances(each) for arm, each in zip(arms, since, strict=True)]
-        )
+        rows = np.asarray(arms).reshape(-1, *[1] * (cycles.ndim - 1))
+        return self._inverse.at(rows, cycles - self.middle / CYCLE)
+
+    @cached_property
+    def _inverse(self) -> _Inverse:
+        return _Inverse.of(self.tables)
 
     def aims(self, arms: Sequence[int], cycles: NDArray[np.int64]) -> tuple[Floats, Floats]:
         """(arms, cycles) both."""
@@ -516,7 +518,7 @@ class ContactTable:
         return np.where(t < 0.0, before, np.where(t > 1.0, after, inside))
 
     @cached_property
-    def _steps(self) -> tuple[Floats, Floats]:
+    def steps(self) -> tuple[Floats, Floats]:
         """Distances (steps,) close to each other, and cycles there."""
         number = np.arange((len(self.at) - 1) * _FINE + 1) / _FINE
         fine = np.interp(number, np.arange(len(self.at)), self.at)
@@ -542,13 +544,76 @@ class ContactTable:
         """At cycles (…,)."""
         low = self.values[0] if self.starts else -np.inf
         cycles = np.clip(cycles, low, self.values[-1] if self.stops else np.inf)
-        fine, values = self._steps
+        fine, values = self.steps
         inside = np.interp(cycles, values, fine)
         steep = np.maximum(self.slopes[[0, -1]], 1e-12)
         before = self.at[0] + (cycles - self.values[0]) / steep[0]
         after = self.at[-1] + (cycles - self.values[-1]) / steep[1]
         low, high = cycles < self.values[0], cycles > self.values[-1]
         return np.where(low, before, np.where(high, after, inside))
+
+
+@dataclass(frozen=True, eq=False)
+class _Inverse:
+    """Distances by cycles of several tables at once; their steps follow one another."""
+
+    cycles: Floats
+    """(steps,)"""
+    distances: Floats
+    """(steps,)"""
+    order: Floats
+    """(steps,) cycles since the first step of a table, those of each table after the one before."""
+    ends: Floats
+    """(4, tables) cycles and distances of the first step, then of the last one."""
+    reach: Floats
+    """(2, tables) cycles that there are at least and at most."""
+    steep: Floats
+    """(2, tables) cycles per metre before the first step, and after the last one."""
+    apart: float
+    """Between the first steps of two tables in that order."""
+    first: NDArray[np.intp]
+    """(tables + 1,) number of each one's first step."""
+
+    @classmethod
+    def of(cls, tables: Sequence[ContactTable]) -> _Inverse:
+        """Of these tables."""
+        fine, values = zip(*(each.steps for each in tables), strict=True)
+        apart = max(float(each[-1] - each[0]) for each in values) + 1.0
+        order = [each - each[0] + number * apart for number, each in enumerate(values)]
+        lows = [each.values[0] if each.starts else -np.inf for each in tables]
+        highs = [each.values[-1] if each.stops else np.inf for each in tables]
+        ends = [(v[0], at[0], v[-1], at[-1]) for v, at in zip(values, fine, strict=True)]
+        return cls(
+            cycles=np.concatenate(values),
+            distances=np.concatenate(fine),
+            order=np.concatenate(order),
+            ends=np.array(ends).T,
+            reach=np.array([lows, highs]),
+            steep=np.maximum(np.array([each.slopes[[0, -1]] for each in tables]).T, 1e-12),
+            apart=apart,
+            first=np.cumsum([0, *map(len, values)]),
+        )
+
+    def at(self, rows: NDArray[np.intp], cycles: Floats) -> Floats:
+        """Of tables (rows, …) at cycles (rows, …)."""
+        start, near, stop, far = self.ends[:, rows]
+        low, high = self.reach[:, rows]
+        cycles = np.clip(cycles, low, high)
+        order = np.clip(cycles, start, stop) - start + rows * self.apart
+        step = np.searchsorted(self.order, order, "right") - 1
+        step = np.clip(step, self.first[rows], self.first[rows + 1] - 2)
+        here, there = self.cycles[step], self.cycles[step + 1]
+        rise = self.distances[step + 1] - self.distances[step]
+        share = np.divide(
+            cycles - here, there - here, out=np.zeros_like(cycles), where=there > here
+        )
+        inside = self.distances[step] + share * rise
+        before, after = self.steep[:, rows]
+        return np.where(
+            cycles < start,
+            near + (cycles - start) / before,
+            np.where(cycles > stop, far + (cycles - stop) / after, inside),
+        )
 
 
 def _even_table(first: float, last: float, stride: float, duty: float) -> ContactTable:

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -92,7 +91,7 @@ class _Reach:
 class Passing:
     """Where the body carries the arms' roots, at times since the middle of each stance."""
 
-    def __init__(self, roots: Floats, seen: Sequence[Floats]) -> None:
+    def __init__(self, roots: Floats, seen: Floats) -> None:
         self.middle = roots
         """(arms, cycles, 3) half way through, world."""
         self.touch_down, self.peeling, self.lift_off = seen
@@ -195,32 +194,27 @@ def _spot(
 ) -> tuple[Floats, Floats]:
     """Distances from the root, and metres that these are wrong by, both (arms, cycles)."""
     roots, nearest = passing.middle, _NEAREST * reach.whole
-    taut = _TAUT * reach.longer
-    held = (
-        (passing.touch_down, taut * reach.free, 0.0 * reach.free),
-        (passing.peeling, taut * reach.free, 0.0 * reach.free),
-        (passing.lift_off, taut * (reach.free + reach.peeled), reach.peeled),
-    )
+    # As it is seen from the root half way through: where it is then, and as the hold begins, as it
+    # ends, and as peeling begins.
+    seen = np.stack([roots, passing.touch_down, passing.lift_off, passing.peeling])
+    aside = seen[..., :2] - roots[..., :2]
+    onto = np.sum(aside * aim, axis=-1)
+    taut = _TAUT * reach.longer * np.stack([reach.free, reach.free + reach.peeled, reach.free])
+    beyond = np.stack([0.0 * reach.free, reach.peeled, 0.0 * reach.free])
+    level = onto[1:] ** 2 - np.sum(aside[1:] ** 2, axis=-1)
     found = np.broadcast_to(0.5 * reach.free, aim.shape[:2])
     lack = np.zeros(aim.shape[:2])
     for _ in range(_ROUNDS):
         z = ground.height(roots[..., :2] + found[..., None] * aim)
-        easy = (_EASY * reach.free) ** 2 - (roots[..., 2] - z) ** 2
-        least = np.broadcast_to(nearest, z.shape)
-        for root in (passing.touch_down, roots, passing.lift_off):
-            onto = np.sum((root[..., :2] - roots[..., :2]) * aim, axis=-1)
-            slackest = reach.slackest**2 - (root[..., 2] - z) ** 2
-            least = np.maximum(least, onto + np.sqrt(np.maximum(slackest, nearest**2)))
-        lack, farthest = np.zeros(z.shape), np.full(z.shape, np.inf)
-        for root, far, beyond in held:
-            level = far**2 - (root[..., 2] - z) ** 2
-            apart = roots[..., :2] - root[..., :2]
-            # |apart + d aim|² ≤ level, for the largest d.
-            onto = np.sum(apart * aim, axis=-1)
-            inside = onto**2 - np.sum(apart**2, axis=-1) + level
-            largest = np.sqrt(np.maximum(inside, 0.0)) - onto - beyond
-            lack = np.maximum(lack, np.where(inside < 0.0, reach.whole, least - largest))
-            farthest = np.minimum(farthest, largest)
+        above = (seen[..., 2] - z) ** 2
+        easy = (_EASY * reach.free) ** 2 - above[0]
+        slackest = np.sqrt(np.maximum(reach.slackest**2 - above[:3], nearest**2))
+        least = np.maximum(nearest, (onto[:3] + slackest).max(axis=0))
+        # |d aim − aside|² ≤ taut² − above, for the largest d.
+        inside = level + (taut**2 - above[1:])
+        largest = np.sqrt(np.maximum(inside, 0.0)) + onto[1:] - beyond
+        lacking = np.where(inside < 0.0, reach.whole, least - largest)
+        lack, farthest = np.maximum(lacking.max(axis=0), 0.0), largest.min(axis=0)
         easily = np.sqrt(np.maximum(easy, nearest**2))
         limit = np.minimum(np.where(np.isnan(away), easily, away), farthest)
         # What is too near looks bad, but what is too far slides.
@@ -443,7 +437,7 @@ def lay(
     skins = np.broadcast_to(limbs.radii[joint:].T[:, None], (*shape, len(limbs.radii) - joint))
     joints = laid(limbs, ground, joint, skins=skins, spot=spot, heading=heading, curl=curl)
     touch_down, lift_off, middles = _times(overridden.shift, half)
-    at_touch_down, at_lift_off = roots.at(touch_down)[0], roots.at(lift_off)[0]
+    at_touch_down, at_lift_off = roots.at(np.stack([touch_down, lift_off]))[0]
     return Footholds(
         first=first,
         touching=joint,
@@ -487,7 +481,9 @@ class _RootPath:
     """… and by how much its stance's middle is later, as the gait has it, in cycles."""
 
     def at(self, since: Floats) -> tuple[Floats, Floats]:
-        """World positions (arms, cycles, 3) and the body's orientations, at times since then."""
+        """World positions (…, arms, cycles, 3) and the body's orientations, at times since then
+        (…, arms, cycles).
+        """
         centres, rotations = self.line.at(self._distances(since))
         return centres + rotate(rotations, self.limbs.roots[:, None]), rotations
 
@@ -497,9 +493,10 @@ class _RootPath:
         return values_along(self.line.settings.along.hold, share, settings.duty)
 
     def _distances(self, since: Floats) -> Floats:
-        """Metres (arms, cycles) along the route at times since the middles of stances."""
+        """Metres (…, arms, cycles) along the route at times since the middles of stances."""
         middles = self.middle + self.numbers.astype(np.float64)
-        return self.timing.distances(self.limbs.arms, middles + since)
+        cycles = np.moveaxis(middles + since, -2, 0)
+        return np.moveaxis(self.timing.distances(self.limbs.arms, cycles), 0, -2)
 
 
 def _places(
@@ -518,7 +515,7 @@ def _places(
     aim, lie = rotate_in_plane(aim, aside), rotate_in_plane(lie, aside)
     # One after the other, for the first will do for nearly all.
     passings = (
-        (times[2], Passing(roots, [path.at(shift + each)[0] for each in times]))
+        (times[2], Passing(roots, path.at(shift + np.stack(times))[0]))
         for times in stance_times(path.duty(settings, shift))
     )
     distance, half = spots(limbs, ground, settings, passings, aim=aim, away=away + farther)
@@ -532,10 +529,8 @@ def _unturned(path: _RootPath, shift: Floats, half: Floats) -> Floats:
 
     An arm that lies where it lies while the body turns is wound round it, and lets go wildly.
     """
-    ways = [_ahead(path.limbs, path.at(shift + each)[1])[0] for each in (-half, 0.0 * half, half)]
-    turned = sum(
-        np.arccos(np.clip(np.sum(one * other, axis=-1), -1.0, 1.0)) for one, other in pairwise(ways)
-    )
+    ways, _ = _ahead(path.limbs, path.at(shift + half * np.reshape([-1.0, 0.0, 1.0], (3, 1, 1)))[1])
+    turned = np.arccos(np.clip(np.sum(ways[1:] * ways[:-1], axis=-1), -1.0, 1.0)).sum(axis=0)
     return 1.0 / (1.0 + np.maximum(turned / _WOUND - 1.0, 0.0))
 
 
@@ -657,13 +652,15 @@ def _overridden(
 
 
 def _ahead(limbs: Limbs, rotations: Floats) -> tuple[Floats, Floats]:
-    """Which way arms point, and lie, seen from above: unit vectors (arms, cycles, 2) both."""
+    """Which way arms of a body's orientations (…, arms, cycles, 4) point, and lie, seen from above:
+    unit vectors (…, arms, cycles, 2) both.
+    """
     ahead = np.zeros((len(limbs.arms), 2, 3))
     ahead[..., 0], ahead[..., 1] = np.cos(limbs.aims), np.sin(limbs.aims)
     ahead = rotate(limbs.outward[:, None], ahead)
-    ahead = rotate(rotations[:, :, None], ahead[:, None])[..., :2]
+    ahead = rotate(rotations[..., None, :], ahead[:, None])[..., :2]
     ahead = ahead / np.maximum(np.linalg.norm(ahead, axis=-1, keepdims=True), 1e-9)
-    return ahead[:, :, 0], ahead[:, :, 1]
+    return ahead[..., 0, :], ahead[..., 1, :]
 
 
 def _curls(limbs: Limbs, cycles: np.ndarray, seed: int) -> Floats:

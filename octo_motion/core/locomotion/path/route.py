@@ -72,6 +72,9 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 _FIRST_PIECES: Final = 4
 _DEEPEST: Final = 24
 _MOST_STEPS: Final = 100
+_GUESSES: Final = 32
+"""Places of each piece that a search for a distance begins between: two steps of it settle the last
+digit then."""
 
 _NOWHERE: Final = "Give the curve at least two points that lie apart."
 
@@ -231,17 +234,14 @@ class Route:
         piece = np.clip(np.searchsorted(self._distances, flat, "right") - 1, 0, last)
         start, low, high = self._pieces[piece], self._pieces[piece], self._pieces[piece + 1]
         missing = flat - self._distances[piece]
-        # A piece without length has nothing to share out; any point of it is right.
-        whole = self._distances[piece + 1] - self._distances[piece]
-        share = np.divide(missing, whole, out=np.zeros_like(flat), where=whole > 0.0)
-        s = low + share * (high - low)
+        s = np.clip(_looked_up(self._places, flat), low, high)
         # Each element stops on its own account, so that its last digit depends on no other.
         busy = np.arange(len(flat))
         for _ in range(_MOST_STEPS):
-            error = self._arc(start[busy], s[busy]) - missing[busy]
+            arc, speed = self._measured(start[busy], s[busy])
+            error = arc - missing[busy]
             low[busy] = np.where(error <= 0.0, s[busy], low[busy])
             high[busy] = np.where(error >= 0.0, s[busy], high[busy])
-            speed = _norm(self.velocity(s[busy]))
             step = np.divide(error, speed, out=np.full_like(error, np.inf), where=speed > 0.0)
             trial = s[busy] - step
             inside = (trial > low[busy]) & (trial < high[busy])
@@ -253,6 +253,19 @@ class Route:
                 break
         s = np.where(flat <= 0.0, 0.0, np.where(flat >= self.length, 1.0, s))
         return s.reshape(wanted.shape)
+
+    @cached_property
+    def _places(self) -> tuple[Floats, Floats, Floats]:
+        """Distances (n,), parameters there, and how much these grow with a metre."""
+        steps = np.linspace(0.0, 1.0, _GUESSES, endpoint=False)
+        start, width = self._pieces[:-1, None], np.diff(self._pieces)[:, None]
+        at = start + width * steps
+        arcs = self._arc(np.repeat(start, _GUESSES), at.ravel()).reshape(at.shape)
+        parameters = np.append(at, 1.0)
+        speed = _norm(self.velocity(parameters))
+        slopes = np.divide(1.0, speed, out=np.zeros_like(speed), where=speed > 1e-9 * self.length)
+        distances = np.append(self._distances[:-1, None] + arcs, self.length)
+        return np.maximum.accumulate(distances), parameters, slopes
 
     def reverse(self) -> Route:
         """The same curve travelled from its end to its start."""
@@ -283,14 +296,19 @@ class Route:
         return [each / share[..., None] ** power for power, each in enumerate(result)]
 
     def _arc(self, start: Floats, end: Floats) -> Floats:
-        """Metres from parameters ``start`` to ``end``, both within one piece, by Gauss–Legendre."""
+        return self._measured(start, end)[0]
+
+    def _measured(self, start: Floats, end: Floats) -> tuple[Floats, Floats]:
+        """Metres from parameters ``start`` to ``end``, both within one piece, by Gauss–Legendre;
+        with them comes the speed at the end, by which they grow with the parameter.
+        """
         half, middle = 0.5 * (end - start), 0.5 * (end + start)
         speed = self._speed_within(middle)
         # Summed node by node: a matrix product rounds differently for each number of rows.
         total = np.zeros_like(half)
         for node, weight in zip(_NODES, _WEIGHTS, strict=True):
             total += weight * speed(middle + node * half)
-        return total * half
+        return total * half, speed(end)
 
     def _speed_within(self, middle: Floats) -> Callable[[Floats], Floats]:
         """Speeds at parameters within the segments that the parameters ``middle`` lie in."""
@@ -394,6 +412,22 @@ def _bernstein(controls: Floats, segment: np.ndarray, t: Floats, highest: int) -
     if degree == 1 and highest >= 2:
         result.append(np.zeros_like(result[0]))
     return result
+
+
+def _looked_up(table: tuple[Floats, Floats, Floats], at: Floats) -> Floats:
+    """Values at places (n,), by the cubics between those of a table: places (m,) that ascend,
+    values there, and slopes.
+    """
+    places, values, slopes = table
+    number = np.clip(np.searchsorted(places, at, "right") - 1, 0, len(places) - 2)
+    whole = places[number + 1] - places[number]
+    # A stretch without length has nothing to share out; any point of it is right.
+    t = np.zeros_like(whole)
+    np.divide(at - places[number], whole, out=t, where=whole > 0.0)
+    rise = values[number + 1] - values[number]
+    first, last = whole * slopes[number], whole * slopes[number + 1]
+    bend = first + last - 2.0 * rise
+    return values[number] + t * (first + t * (rise - first - bend + t * bend))
 
 
 def _norm(vectors: Floats) -> Floats:

@@ -162,65 +162,69 @@ def rotate_bones(
     batch = frames * arms
     wanted = directions.reshape(bones, 3, batch)
     half = 0.5 * bank.reshape(bones, batch)
-    result = np.empty((frames, arms, bones, 4))
+    turns, twists = np.empty((bones, 4, batch)), half.copy()
     orientation = np.zeros((4, batch))
     orientation[0] = 1.0
-    banked = np.zeros(batch)
+    banked = np.cumsum(2.0 * half, axis=0)
+    cosines, sines = np.cos(banked), np.sin(banked)
+    own = _tiled([rest.carried for rest in rests], frames)
+    segments = _tiled([rest.segments for rest in rests], frames)
+    first, between = _straightened(rests, segments, frames)
+    follows = np.array([rest.follows for rest in rests]).T
+    sides = _tiled(facing.sides, frames) if facing is not None else None
     for bone in range(bones):
-        segment = _tiled([rest.segments[bone] for rest in rests], frames)
-        carried = _tiled([rest.carried[bone] for rest in rests], frames)
-        follows = np.array([rest.follows[bone] for rest in rests])
-        if np.all(follows):
+        carried = own[bone]
+        if np.all(follows[bone]):
             carried = components_first.multiply(orientation, carried)
-        elif np.any(follows):
+        elif np.any(follows[bone]):
             carried = np.where(
-                np.tile(follows, frames), components_first.multiply(orientation, carried), carried
+                np.tile(follows[bone], frames),
+                components_first.multiply(orientation, carried),
+                carried,
             )
-        turn = _swing(rests, bone, carried, wanted[bone])
-        twisted = half[bone]
-        if facing is not None:
-            side = _tiled([each[bone] for each in facing.sides], frames)
-            side = components_first.rotate(components_first.multiply(carried, turn), side)
+        goal = components_first.rotate(components_first.conjugate(carried), wanted[bone])
+        turn = components_first.shortest_arc(between[bone], goal)
+        if first is not None:
+            turn = components_first.multiply(turn, first[bone])
+        turns[bone], twisted = turn, twists[bone]
+        orientation = components_first.multiply(carried, turn)
+        if facing is not None and sides is not None:
+            side = components_first.rotate(orientation, sides[bone])
             # Bank is meant to be seen: it is what the side is turned away by.
-            banked = banked + 2.0 * half[bone]
             towards = facing.towards[bone].reshape(3, batch)
             sine = dot(components_first.cross(side, towards), wanted[bone])
             cosine = dot(side, towards) - dot(side, wanted[bone]) * dot(towards, wanted[bone])
-            askew = np.sin(banked) * cosine + np.cos(banked) * sine
+            askew = sines[bone] * cosine + cosines[bone] * sine
             # Where all face away, each would add its own to what those before it turned.
-            right = np.cos(banked) * cosine - np.sin(banked) * sine
+            right = cosines[bone] * cosine - sines[bone] * sine
             askew *= 0.5 * (1.0 + right)
-            twisted = twisted + 0.5 * facing.most_turn[bone].reshape(batch) * askew
+            twisted += 0.5 * facing.most_turn[bone].reshape(batch) * askew
         if np.any(twisted):
-            turn = components_first.multiply(
-                turn, np.concatenate([np.cos(twisted)[None], np.sin(twisted) * segment])
-            )
-        orientation = components_first.multiply(carried, turn)
-        result[:, :, bone] = turn.T.reshape(frames, arms, 4)
-    return result
+            twist = np.concatenate([np.cos(twisted)[None], np.sin(twisted) * segments[bone]])
+            turns[bone] = components_first.multiply(turn, twist)
+            orientation = components_first.multiply(orientation, twist)
+    return np.ascontiguousarray(turns.reshape(bones, 4, frames, arms).transpose(2, 3, 0, 1))
 
 
-def _swing(rests: Sequence[ArmRest], bone: int, carried: Floats, wanted: Floats) -> Floats:
-    """Quaternions (4, batch), in a bone's rest frame, that bring its segment where it is wanted
-    (3, batch) from where it is carried (4, batch), armature space both.
+def _straightened(
+    rests: Sequence[ArmRest], segments: Floats, frames: int
+) -> tuple[Floats | None, Floats]:
+    """Turns (bones, 4, batch) of each bone's segment (bones, 3, batch) to where it goes straight on
+    from the one before, and where that is (bones, 3, batch), in its rest frame; none where the arms
+    lead out of no body.
     """
-    frames = wanted.shape[-1] // len(rests)
-    segment = _tiled([rest.segments[bone] for rest in rests], frames)
-    goal = components_first.rotate(components_first.conjugate(carried), wanted)
     if all(rest.outward is None for rest in rests):
-        return components_first.shortest_arc(segment, goal)
-    between = [rest.straight_on(bone) for rest in rests]
-    first = components_first.shortest_arc(
-        _tiled([rest.segments[bone] for rest in rests], 1), _tiled(between, 1)
-    )
-    return components_first.multiply(
-        components_first.shortest_arc(_tiled(between, frames), goal), np.tile(first, (1, frames))
-    )
+        return None, segments
+    on = np.array([[each.straight_on(bone) for bone in range(len(segments))] for each in rests])
+    own = np.array([rest.segments for rest in rests])
+    flat = components_first.shortest_arc(own.reshape(-1, 3).T, on.reshape(-1, 3).T)
+    turns = flat.T.reshape(*on.shape[:2], 4)
+    return _tiled(list(turns), frames), _tiled(list(on), frames)
 
 
 def _tiled(each: Sequence[Floats], frames: int) -> Floats:
-    """What differs by arm, (components,) each, as (components, frames × arms)."""
-    return np.tile(np.stack(each, axis=-1), (1, frames))
+    """What differs by arm, (bones, components) each, as (bones, components, frames × arms)."""
+    return np.tile(np.stack(each, axis=-1), (1, 1, frames))
 
 
 # --- Arms as frames along them, whatever rig they belong to: where the rig's own axes end ---------

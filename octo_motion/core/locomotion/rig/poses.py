@@ -220,7 +220,7 @@ def find_mantle(
     same = _SAME_PLACE * float(np.max(np.ptp(skeleton.heads, axis=0), initial=0.0))
     best: tuple[int, ...] = ()
     largest = 0.0
-    for tip in range(len(skeleton)):
+    for tip in sorted(set(range(len(skeleton))) - limbs):
         path = _path(skeleton, tip, carrying, same)
         if not path or not limbs.isdisjoint(path):
             continue
