@@ -110,13 +110,14 @@ def _timed(what: str, change: Callable[[int], None]) -> Measured:
     }
 
 
-def _follow(armature: Any) -> None:
-    """Let the frame in sight catch up with a change."""
+def _follow(armature: Any, *, tagged: bool = True) -> None:
+    """Let the frame in sight catch up with a change, of its settings or of another object."""
     import bpy
 
     from octo_motion.ui.locomotion.operators import generate as live
 
-    armature.update_tag(refresh={"OBJECT"})
+    if tagged:
+        armature.update_tag(refresh={"OBJECT"})
     bpy.context.view_layer.update()
     live.run_pending()
     assert armature.octo_motion.locomotion.live
@@ -128,7 +129,7 @@ def _route(armature: Any) -> Callable[[int], None]:
 
     def change(_number: int) -> None:
         point.co.x += 0.02
-        _follow(armature)
+        _follow(armature, tagged=False)
 
     return change
 
@@ -144,7 +145,7 @@ def _slider(armature: Any) -> Callable[[int], None]:
 def _ground(armature: Any) -> Callable[[int], None]:
     def change(_number: int) -> None:
         armature.octo_motion.locomotion.ground.object.location.x += 0.05
-        _follow(armature)
+        _follow(armature, tagged=False)
 
     return change
 

@@ -22,6 +22,7 @@ import numpy as np
 
 from ..errors import SettingsError
 from ..rotations import Floats
+from ..steps import finished
 from .channels import BezierKeys, Booleans
 from .dense import dense_keys
 from .key_times import Choice
@@ -77,11 +78,7 @@ def reduce_keys(
         SettingsError: a bound is not above zero.
     """
     steps = reducing(frames, limbs, every=every, all_of_them=all_of_them, loops=loops)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as finished:
-            return finished.value
+    return finished(steps)
 
 
 def reducing(
@@ -112,8 +109,8 @@ def reducing(
         while True:
             try:
                 share = next(steps)
-            except StopIteration as finished:
-                result.append(finished.value)
+            except StopIteration as last:
+                result.append(last.value)
                 break
             yield _CHOOSING + (1.0 - _CHOOSING) * (done + own * share) / whole
         done += own

@@ -181,6 +181,34 @@ def test_what_is_made_live_is_what_the_button_makes(octopus: Any, number: int) -
     assert motion(octopus) == followed
 
 
+def test_what_changes_along_with_a_dragged_route_counts_too(octopus: Any) -> None:
+    settings_of(octopus).ground.object = make_square(20.0)
+    settle()
+
+    def drag() -> None:
+        drag_route(octopus)
+        bpy.context.view_layer.update()
+        live.run_pending()
+
+    def is_what_the_button_makes() -> bool:
+        live.finish_following()
+        followed = motion(octopus)
+        generate(octopus)
+        return motion(octopus) == followed
+
+    drag()
+    drag()
+    assert is_what_the_button_makes()
+    drag()
+    settings_of(octopus).softness = 0.3
+    drag()
+    assert is_what_the_button_makes()
+    drag()
+    settings_of(octopus).ground.object.location.z += 0.2
+    drag()
+    assert is_what_the_button_makes()
+
+
 def test_the_motion_follows_its_ground(octopus: Any) -> None:
     ground = make_square(20.0)
     settings_of(octopus).ground.object = ground

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...rotations import Floats
 
-
 _BELL: Final = 9.0
 """Standard deviations beyond which nothing of a bell is left in the last digit."""
 

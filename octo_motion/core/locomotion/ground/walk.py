@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from ...rotations import Floats, components_first, conjugate, from_matrix, multiply, rotate
 from ...skeleton import Skeleton
+from ...steps import finished
 from ..gait import CYCLE, Build, GaitPoser, bone_twists
 from ..path import Line, values_along
 from ..rig import ArmSkin, BodyFrame, Facing, rotate_bones, sucker_sides
@@ -199,14 +200,14 @@ class WalkPart:
     limbs: Limbs
     footholds: Footholds
 
-    def pose(
+    def posing(
         self,
         number: int,
         moments: Moments,
         higher: Raise | None,
         smoothing: SwingSmoothing | None,
-    ) -> PartPoses:
-        """The arms of this part, by its number as ``Raise`` counts them, at some moments.
+    ) -> Generator[None, None, PartPoses]:
+        """The arms of this part, by its number as ``Raise`` counts them, at some moments, in steps.
 
         Some are to be higher, or all are as high as they have to be. In the air they are evened out
         over frames that follow one another.
@@ -228,10 +229,12 @@ class WalkPart:
         else:
             shapes = higher.shapes[number]
         arms, facing = self._batch(moments, chosen, higher)
+        yield
         shapes = components_first.rotate(facing, shapes[..., chosen].reshape(bones, 3, -1))
         times = (each[:, columns].reshape(-1) for each in (moments.cycles, moments.since))
         stance = stance_at(arms, self.footholds, *times)
         strains, ways = pulled_to_footholds(arms, shapes, stance, self.ground, self.settings)
+        yield
         evened, each_frame = None, (bones, 3, frames, many)
         if higher is not None and higher.evened:
             ways = components_first.normalized(
@@ -241,6 +244,7 @@ class WalkPart:
             before, share = ways, airborne(stance).reshape(frames, many)
             ways = smoothing.evened(ways.reshape(each_frame), share).reshape(ways.shape)
             evened = (ways - before).reshape(each_frame)
+        yield
         lift = np.repeat(moments.lift, many)
         pose = kept_over_ground(arms, (strains, ways), stance, self.ground, lift)
         twists = bone_twists(self.build, moments.angles[:, columns])
@@ -484,7 +488,22 @@ class GroundedWalk:
         *,
         smoothing: SwingSmoothing | None = None,
     ) -> GroundedPoses:
-        """The arms at some frames.
+        """The arms at some frames; arguments are as of :meth:`posing`."""
+        return finished(
+            self.posing(phase, turn, centres, orientations, higher, smoothing=smoothing)
+        )
+
+    def posing(
+        self,
+        phase: Floats,
+        turn: Floats,
+        centres: Floats,
+        orientations: Floats,
+        higher: Raise | None = None,
+        *,
+        smoothing: SwingSmoothing | None = None,
+    ) -> Generator[None, None, GroundedPoses]:
+        """The arms at some frames, in steps.
 
         Args:
             phase: (frames,) of the body's gait, radians.
@@ -504,9 +523,10 @@ class GroundedWalk:
         moments = Moments(
             angles, steering, cycles, since, centres, orientations, to_armature, self._lift(phase)
         )
-        parts = [
-            part.pose(number, moments, higher, smoothing) for number, part in enumerate(self._parts)
-        ]
+        parts: list[PartPoses] = []
+        for number, part in enumerate(self._parts):
+            parts.append((yield from part.posing(number, moments, higher, smoothing)))
+            yield
         rotations = np.zeros((len(phase), self._ends[-1], 4))
         strains = np.zeros(rotations.shape[:2])
         misses = np.zeros(phases.shape)
@@ -556,24 +576,22 @@ class GroundedWalk:
         found: list[Foothold] = []
         first, last = self._last
         for part in self._parts:
-            laid = part.footholds
-            for place, arm in enumerate(part.build.arms):
-                for cycle in range(int(first[arm]), int(last[arm]) + 1):
-                    at = place, cycle - laid.first
-                    if not laid.present[at]:
-                        continue
-                    since = np.array([laid.touch_down[at], laid.lift_off[at]])
-                    turns = self._middle / CYCLE + cycle + since
-                    ends = self._timing.distances([arm], turns[None])[0] * CYCLE / self._stride
-                    found.append(
-                        Foothold(
-                            arm,
-                            cycle,
-                            laid.joints[at][0],
-                            float(laid.headings[at]),
-                            float(ends[0]),
-                            float(ends[1]),
-                            float(since[1] - since[0]),
-                        )
-                    )
+            laid, arms = part.footholds, list(part.build.arms)
+            cycles = laid.first + np.arange(laid.present.shape[1])
+            since = np.stack([laid.touch_down, laid.lift_off], axis=-1)
+            turns = self._middle / CYCLE + cycles[:, None] + since
+            ends = self._timing.distances(arms, turns) * CYCLE / self._stride
+            there = (cycles >= first[arms, None]) & (cycles <= last[arms, None]) & laid.present
+            found += [
+                Foothold(
+                    arms[place],
+                    laid.first + number,
+                    laid.joints[place, number, 0],
+                    float(laid.headings[place, number]),
+                    touch_down=float(ends[place, number, 0]),
+                    lift_off=float(ends[place, number, 1]),
+                    lasts=float(since[place, number, 1] - since[place, number, 0]),
+                )
+                for place, number in np.argwhere(there).tolist()
+            ]
         return sorted(found, key=lambda each: (each.arm, each.cycle))

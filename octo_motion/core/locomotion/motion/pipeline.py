@@ -16,6 +16,7 @@ import numpy as np
 from ...keyframes import Channel
 from ...phrases import phrase
 from ...rotations import IDENTITY, Floats, conjugate, from_matrix, multiply, rotate, slerp
+from ...steps import finished
 from ..body import BodyMoments, OrganPoses, pose_organs
 from ..clearance import (
     ArmsOverGround,
@@ -29,7 +30,7 @@ from ..clearance import (
 )
 from ..ground import Ground, sample_ground
 from ..metrics import TOLD, Figure, Measured, figures
-from ..path import plan_travel
+from ..path import bearings_of, plan_travel, travel_at
 from ..reaching import Carried, Reached, Travelling
 from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
 from .few_keys import Motion, measure_keyed, reduced
@@ -130,17 +131,18 @@ Travelled = tuple[Floats, Floats]
 """Locations (moments, 3) and orientations (moments, 4) of the armature, world."""
 
 
-def compute(job: MotionJob) -> Steps[MotionResult]:
-    """Work a motion out, in steps that yield the share that is done: 0…1, 1 at the end.
+def compute(job: MotionJob, *, brief: bool = False) -> Steps[MotionResult]:
+    """Work a motion out, in steps that yield the share that is done: 0…1, 1 at the end. Brief,
+    steps take less long, and all of them longer; the numbers are the same.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
     plan = yield from _scaled(plan_motion(job), 0.0, _PLANNING)
-    return (yield from _scaled(pose(plan), _PLANNING, 1.0))
+    return (yield from _scaled(pose(plan, brief=brief), _PLANNING, 1.0))
 
 
-def pose(plan: MotionPlan) -> Steps[MotionResult]:
+def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     """Work out what is planned, as :func:`compute` does.
 
     Raises:
@@ -149,7 +151,7 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     moments, times = _moments(plan)
     reducing, every = plan.tolerances is not None or plan.subframe_sampled, plan.stride
     moving = _MOVING if reducing else 1.0
-    at_once = _BONES_AT_ONCE // (_TURNS if plan.job.live else 1)
+    at_once = _BONES_AT_ONCE // (_TURNS if brief else 1)
     step = max(1, at_once // max(len(plan.first.poser.bones), 1))
     posing = _posed(plan, times, step, cyclic=plan.job.in_place)
     trailing = plan.job.body.trailing
@@ -162,6 +164,7 @@ def pose(plan: MotionPlan) -> Steps[MotionResult]:
     arms, going, keyed, reached = posed.arms, posed.going, posed.keyed, posed.reached
     warnings = [*plan.warnings, *posed.warnings]
     motion, further = _motion(plan, posed, moments)
+    yield moving
     on_frames = arms.at(slice(None, None, every))
     framed = going[0][::every], going[1][::every]
     measured, overlaps = _measured(plan, on_frames, framed, keyed)
@@ -249,6 +252,7 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     reached = _reach(plan, arms, keyed, going)
     yield 0.96
     warnings = _separate(plan, arms, reached, going, swimming=swimming, cyclic=cyclic)
+    yield 0.98
     _take_time(plan, arms, reached, going, cyclic=cyclic)
     if hands and not job.in_place:
         keyed = going = object_transforms(creature.body, creature.scale, *eased)
@@ -300,7 +304,7 @@ def glimpse(plan: MotionPlan, frame: float) -> list[Glimpsed]:
     around = int(np.clip(np.ceil(around), *_AROUND_MOMENTS))
     first, last = max(middle - around, 0), middle + around + 1
     steps = _posed(plan, times[first:last], 2 * around + 1, cyclic=False)
-    posed = _finished(steps)
+    posed = finished(steps)
     if posed.hands:
         _hand_over(plan, posed)
     motion, further = _motion(plan, posed, moments[first:last], every_width=True)
@@ -314,10 +318,16 @@ def way_of(plan: MotionPlan) -> tuple[Floats, Floats]:
     """Where a motion leads, long before it is worked out: places of the body's centre (n, 3) one
     after the other, and of all footholds (m, 3), world.
     """
-    standing, when = plan.first.standing, plan.schedule
-    times = np.linspace(0.0, 1.0, _WAY)
-    table = standing.bearings if standing is not None else None
-    centres, _ = plan.segments.places(plan_travel(when.route, when.travel, times, table))
+    standing, segments = plan.first.standing, plan.segments
+    distance = np.linspace(0.0, plan.schedule.route.length, _WAY)
+    if segments.transitions is None and standing is not None:
+        centres, _ = standing.line.at(distance)
+    else:
+        when = plan.schedule
+        table = bearings_of(when.route, when.travel)
+        centres, _ = segments.places(
+            travel_at(when.route, when.travel, table, distance, np.zeros(_WAY))
+        )
     walks = [walk for walk in plan.segments.walks if walk is not None]
     held = [each.position for walk in walks for each in walk.footholds()]
     return centres, np.array(held, dtype=np.float64).reshape(-1, 3)
@@ -332,15 +342,6 @@ class Glimpsed:
     """(components,)"""
 
 
-def _finished(steps: Steps[_Outcome]) -> _Outcome:
-    """Take all steps at once."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as finished:
-            return finished.value
-
-
 def with_half_frames(values: Floats) -> Floats:
     """Values (frames,) with those half way in between (2 frames − 1,)."""
     result = np.empty(2 * len(values) - 1)
@@ -353,8 +354,8 @@ def _scaled(steps: Steps[_Outcome], start: float, end: float) -> Steps[_Outcome]
     while True:
         try:
             share = next(steps)
-        except StopIteration as finished:
-            return finished.value
+        except StopIteration as last:
+            return last.value
         yield start + (end - start) * share
 
 

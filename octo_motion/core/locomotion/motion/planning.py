@@ -293,6 +293,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         asked = () if job.in_place else overrides
         walk = standing.walk(standing.line, asked) if standing is not None else None
         segments = Segments(gaits, [walk], None, [len(each) for each in job.creature.bones], route)
+    yield 0.8
     pace = pace_of(route, when.travel, when.seconds * job.timing.rate)
     warnings = [*job.warnings, *(standing.warnings if standing is not None else ())]
     if standing is not None or changes:
@@ -301,8 +302,8 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     # A mantle that lies flat is swum along as it is.
     mantle = when.head if swims and job.streamline > 0.0 and not lean else ()
     creature, pushed = job.creature, _surge(job, segments, route)
-    yield 1.0
-    return MotionPlan(
+    yield 0.9
+    plan = MotionPlan(
         job=job,
         segments=segments,
         schedule=when,
@@ -313,6 +314,8 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         surge=pushed,
         warnings=tuple(warnings),
     )
+    yield 1.0
+    return plan
 
 
 @dataclass(frozen=True, eq=False)

@@ -498,8 +498,9 @@ class Segments:
             motion.segments.append(made)
             for start in range(0, len(part), step):
                 chosen = slice(start, min(start + step, len(part)))
-                motion.pose(segment, part, chosen, smoothing, cyclic=cyclic)
-                yield 0.9 * (segment + start / max(len(part), 1)) / self.count
+                done = 0.9 * (segment + start / max(len(part), 1)) / self.count
+                for _ in motion.posing(segment, part, chosen, smoothing, cyclic=cyclic):
+                    yield done
             motion.calm(segment, np.arange(len(travel.distance)), made.arms)
         return motion
 
@@ -528,7 +529,7 @@ class SegmentedMotion:
             return None
         return [np.concatenate(each) for each in zip(*first.joints, strict=True)]
 
-    def pose(
+    def posing(
         self,
         segment: int,
         moments: np.ndarray,
@@ -536,8 +537,8 @@ class SegmentedMotion:
         smoothing: SwingSmoothing | None,
         *,
         cyclic: bool,
-    ) -> None:
-        """Pose the arms at a part of the moments (n,) of a segment.
+    ) -> Generator[None, None, None]:
+        """Pose the arms at a part of the moments (n,) of a segment, in steps.
 
         Swings are evened out over time, or not. Cyclic, the last moment is the first again.
         """
@@ -549,6 +550,7 @@ class SegmentedMotion:
             posed = plan.gaits[number].poser.pose(travel.phase, travel.turn)
             arms.rotations[chosen] = posed.rotations
             arms.misses[chosen] = posed.misses.max(axis=2)
+            yield
             return
         around, own = frames_around(
             part, smoothing.reach if smoothing else 0, len(moments), cyclic=cyclic
@@ -556,7 +558,8 @@ class SegmentedMotion:
         wide = moments[around]
         travel = self._travel(number, wide)
         where = self.places[0][wide], self.places[1][wide]
-        stood = walk.pose(travel.phase, travel.turn, *where, smoothing=smoothing).part(own)
+        wider = yield from walk.posing(travel.phase, travel.turn, *where, smoothing=smoothing)
+        stood = wider.part(own)
         arms.rotations[chosen], arms.strains[chosen] = stood.rotations, stood.strains
         arms.late[chosen] = stood.misses
         arms.cycles[chosen] = stood.cycles + _APART * number

@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any, Final, cast
 
@@ -180,6 +180,8 @@ class _State:
     """What each live armature's motion was made from, by the object's name."""
     changed: dict[str, bool] = field(default_factory=dict)
     """Armatures to look at, and whether it is known already that they changed."""
+    known: dict[str, Shot] = field(default_factory=dict)
+    """What was read of armatures of which at most the route has changed since."""
     following: dict[str, _Work] = field(default_factory=dict)
     """Motions of which no more than the frame in sight is there, by the armature's name."""
     rates: dict[str, float] = field(default_factory=dict)
@@ -321,7 +323,7 @@ def _after_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
             or not touched.isdisjoint(_sources(armature))
             or _is_skin(armature, meshes)
         ):
-            _soon(name, certain=True)
+            _soon(name, certain=True, route_alone=touched <= _route_of(armature))
         elif marked & {name, once_called(locomotion_settings(armature).ground)} - {""}:
             _soon(name, certain=False)
 
@@ -463,6 +465,13 @@ def _sources(armature: bpy.types.Object) -> set[bpy.types.ID]:
     return found | ({settings.weight_curve} - {None})
 
 
+def _route_of(armature: bpy.types.Object) -> set[bpy.types.ID]:
+    """Data-blocks that are a motion's route and nothing else of it."""
+    settings = locomotion_settings(armature)
+    route, own = settings.route, {settings.ground.object, settings.body.look_at, armature.parent}
+    return {route, route.data} - own if route is not None and route not in own else set()
+
+
 def _is_skin(armature: bpy.types.Object, meshes: set[bpy.types.Mesh]) -> bool:
     """Whether the armature deforms any of these."""
     return bool(meshes) and any(each.data in meshes for each in deformed_meshes(armature))
@@ -514,15 +523,17 @@ def _live_armatures() -> list[bpy.types.Object]:
 # --- The motion ----------------------------------------------------------------------------------
 
 
-def _soon(name: str, *, certain: bool, wait: float = _SOON) -> None:
+def _soon(name: str, *, certain: bool, wait: float = _SOON, route_alone: bool = False) -> None:
+    if not route_alone:
+        _state.known.pop(name, None)
     _state.changed[name] = certain or _state.changed.get(name, False)
     if not pending():
         bpy.app.timers.register(run_pending, first_interval=wait)
 
 
 def _drop() -> None:
-    _state.changed.clear()
-    _state.following.clear()
+    for known in (_state.changed, _state.known, _state.following):
+        known.clear()
     _stop(run_pending)
     _stop(run_following)
 
@@ -570,7 +581,9 @@ def _follow(name: str, *, certain: bool) -> None:
         # Leaving edit mode is a change of its own.
         return
     now = _made_from(armature, settings)
-    if not certain and _state.seen.get(name) == now:
+    if _state.seen.get(name) != now:
+        _state.known.pop(name, None)
+    elif not certain:
         return
     with _telling(armature, settings), _deaf(), _window_of(armature):
         _make(armature, settings)
@@ -595,9 +608,10 @@ def _telling(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) ->
 
 def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> None:
     """Show the frame in sight, and let the others follow."""
-    earlier = _state.following.get(armature.name)
-    shown = earlier.motion if earlier is not None else None
-    motion = Following(armature, bpy.context, shown.before if shown is not None else None)
+    earlier, known = _state.following.get(armature.name), _state.known.pop(armature.name, None)
+    before = earlier.motion.before if earlier is not None and earlier.motion is not None else None
+    motion = Following(armature, bpy.context, before, known)
+    _state.known[armature.name] = replace(motion.shot)
     _state.following[armature.name] = _Work(motion, Job(motion.steps()), motion.lines())
     # Whose action it is that another frame shows again is looked at before it is written.
     scene = bpy.context.scene
@@ -635,6 +649,9 @@ def _write(
         _state.seen.pop(armature.name, None)
         _let_go(armature)
         return
+    if motion.shot.detection is not None:
+        # What was found is what is set from now on.
+        _state.known.pop(armature.name, None)
     motion.write()
     # Markers of contacts are where the motion has them now.
     _state.seen[armature.name] = _made_from(armature, settings)
@@ -647,7 +664,8 @@ def _write(
 def _exactly(armature: bpy.types.Object) -> Iterator[float]:
     """What Generate does."""
     shot = prepare(armature, bpy.context)
-    yield from shot.compute()
+    yield 0.0
+    yield from shot.compute(brief=True)
     if not _whose(armature, locomotion_settings(armature)):
         with _deaf():
             shot.write(unedited=True)

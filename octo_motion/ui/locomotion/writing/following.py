@@ -21,7 +21,7 @@ from ....core.locomotion.motion import glimpse, pose, way_of
 from ...overlay_lines import Lines
 from ..reading import previous_action
 from ..settings import locomotion_settings
-from .shot import Shot, prepare
+from .shot import Shot, prepare, rerouted
 
 _PATH: Final = (1.0, 0.75, 0.2, 0.9)
 _FOOTHOLD: Final = (0.3, 0.9, 0.85, 0.9)
@@ -38,6 +38,7 @@ class Following:
         armature: that moves.
         context: with its scene.
         before: of what was being followed, and takes the place of the motion itself.
+        known: the shot as it was read last, if nothing but the route has changed since.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
@@ -48,8 +49,13 @@ class Following:
         armature: bpy.types.Object,
         context: bpy.types.Context,
         before: PropertyValues | None = None,
+        known: Shot | None = None,
     ) -> None:
-        self.shot: Shot = prepare(armature, context, live=True)
+        self.shot: Shot = (
+            rerouted(known, armature, context)
+            if known is not None
+            else prepare(armature, context, live=True)
+        )
         self._plan = plan = self.shot.plan()
         few = locomotion_settings(armature).keys == "REDUCED"
         self.exact = not few and plan.wants_subframes == plan.subframe_sampled
@@ -105,7 +111,7 @@ class Following:
 
     def steps(self) -> Iterator[float]:
         """Work all of it out, yielding the share that is done."""
-        self.shot.result = yield from pose(self._plan)
+        self.shot.result = yield from pose(self._plan, brief=True)
 
     def write(self) -> None:
         """Give the armature its motion; that the one before is not edited is known."""

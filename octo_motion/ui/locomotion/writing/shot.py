@@ -45,6 +45,7 @@ from ....core.locomotion.reaching import Carried
 from ....core.locomotion.rig import Detection
 from ....core.phrases import as_phrase, joined_phrases, phrase
 from ....core.rotations import Floats
+from ....core.steps import finished
 from ...declared_settings import assign, plain
 from ..reading import (
     bones_of,
@@ -190,9 +191,11 @@ class Shot:
     seed: int | None = None
     """The seed that it was made with, if its settings may have another."""
 
-    def compute(self) -> Iterator[float]:
-        """Do the work in steps, yielding the share that is done: 0…1, 1 at the end."""
-        self.result = yield from compute(self.job)
+    def compute(self, *, brief: bool = False) -> Iterator[float]:
+        """Do the work in steps, brief ones or not, yielding the share that is done: 0…1, 1 at the
+        end.
+        """
+        self.result = yield from compute(self.job, brief=brief)
 
     def plan(self) -> MotionPlan:
         """What is computed, without computing it.
@@ -200,12 +203,7 @@ class Shot:
         Raises:
             OctoMotionError: something is wrong that the user can put right.
         """
-        steps = plan_motion(self.job)
-        while True:
-            try:
-                next(steps)
-            except StopIteration as finished:
-                return finished.value
+        return finished(plan_motion(self.job))
 
     def write(self, *, unedited: bool = False) -> Summary:
         """Give the armature its action, in place of the one that was generated before.
@@ -543,6 +541,23 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         extend_scene_range=settings.extend_scene_range,
         note=json.dumps(plain(settings, without=RESULTS), sort_keys=True),
     )
+
+
+def rerouted(shot: Shot, armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
+    """A shot of which nothing but the route has changed since it was read, on its route as it is.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right.
+    """
+    job, settings = shot.job, locomotion_settings(armature)
+    read = job.reaching, job.body.look_at, job.begin, job.end
+    if job.route is None or any(each is not None for each in read):
+        # What moves meanwhile is read at the frames of the motion, and poses where they are.
+        return prepare(armature, context, live=job.live)
+    _check_route(settings, armature)
+    _write_back(settings.route)
+    route = read_route(settings.route, context.evaluated_depsgraph_get(), settings.spline)
+    return replace(shot, job=replace(job, route=route))
 
 
 def _write_back(*objects: bpy.types.Object | None) -> None:
