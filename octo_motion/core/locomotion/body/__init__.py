@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a body does by itself while its arms carry it: it surges, breathes, trails, and looks."""
 
-from .organ_motion import SelfMotion, self_motion
-from .organ_poses import BodyMoments, OrganPoses, pose_organs
-from .organs import Organs, find_organs
-from .settings import BodySettings
-from .surging import Holds, Surge, surge
-from .track import BodyTrack, steps_of
+from .by_itself import (
+    BodySettings,
+    BodyTrack,
+    Holds,
+    SelfMotion,
+    Surge,
+    self_motion,
+    steps_of,
+    surge,
+)
+from .organs import BodyMoments, OrganPoses, Organs, find_organs, pose_organs
 
 __all__ = [
     "BodyMoments",

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bones of a body that move by themselves: found by name, by place, by what hangs on what."""
+"""Bones of a body that move by themselves: found by name, by place, by what hangs on what; and what
+of the body's own motion each of them gets.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,9 +14,11 @@ import numpy as np
 
 from ...errors import RigError
 from ...phrases import phrase
-from ...rotations import Floats
+from ...rotations import Floats, conjugate, from_rotation_vector, multiply, normalized, rotate
 from ...skeleton import Skeleton
+from ...smoothing import smooth_step
 from ..rig import BodyFrame, find_mantle
+from .by_itself import SelfMotion
 
 
 @dataclass(frozen=True)
@@ -165,3 +169,228 @@ def _like(skeleton: Skeleton, bones: Sequence[int], bone: int) -> list[int]:
         if skeleton.parents[each] == skeleton.parents[bone]
         and np.isclose(skeleton.lengths[each], skeleton.lengths[bone], rtol=1e-3)
     ]
+
+
+# --- What each bone gets --------------------------------------------------------------------------
+
+_OF_HEAD: Final = 0.12
+"""Share of the mantle's swing that the head takes, where there is one."""
+_BULGE: Final = 0.35
+"""How much shorter a mantle gets, as a share of how much wider it gets."""
+_AGAINST: Final = 0.9
+"""Radians that the siphon turns against the travel of a swim at most, and …"""
+_AGAINST_WALK: Final = 0.4
+"""… the share of it in a walk."""
+_PUFF: Final = 0.3
+"""By how much wider it is while water leaves it."""
+_SLOW: Final = 0.15
+"""Arm lengths per second at which half of what hangs on a direction of travel is there."""
+_GLANCE: Final = 0.2
+"""Radians that eyes turn to where the body goes at most …"""
+_LOOK: Final = 0.7
+"""… and to what they look at."""
+_HEAD_ABOUT: Final = 0.4
+"""Share of looking about that the head does."""
+_SURE: Final = 0.1, 0.4
+"""Sine of the angle between gaze and the vertical from which on a slit can be level."""
+_SHUT: Final = 0.9
+"""Share of an eye's height that it takes away."""
+_OUTWARD: Final = 0.2
+"""Cosine of the angle between an eye's bone and the way out of the head: from here on it looks
+along its bone."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMoments:
+    """Where a body is at some moments."""
+
+    times: Floats
+    """(moments,) seconds."""
+    orientations: Floats
+    """(moments, 4) of the armature, world."""
+    look: Floats | None
+    """(moments, 3) where from the eyes what they look at is, world; none for nothing."""
+    held: Floats
+    """(moments, bones of the mantle, 4) from rest: what the mantle is stretched out by."""
+
+
+@dataclass(frozen=True, eq=False)
+class OrganPoses:
+    """Bones of a body that move by themselves, at some moments."""
+
+    bones: tuple[str, ...]
+    rotations: Floats
+    """(moments, bones, 4) from rest."""
+    scales: dict[str, Floats]
+    """(moments, 3) of those that may get wider or narrower."""
+
+
+def pose_organs(
+    motion: SelfMotion, organs: Organs, skeleton: Skeleton, up: Floats, moments: BodyMoments
+) -> OrganPoses:
+    """The bones of a body as it moves by itself.
+
+    Args:
+        motion: how it does.
+        organs: its bones.
+        skeleton: the rig.
+        up: (3,) unit, the body's up at rest, as the armature has it.
+        moments: when, and where it is then.
+    """
+    posing = _Posing(motion, organs, skeleton, up, moments)
+    names = [*organs.mantle, *([organs.siphon] if organs.siphon else []), *organs.eyes]
+    for bone in sorted(skeleton.index[name] for name in names):
+        posing.add(bone)
+    bones = tuple(name for name in names if posing.turns(name))
+    rotations = [posing.bases[skeleton.index[name]] for name in bones]
+    count = len(moments.times)
+    return OrganPoses(
+        bones,
+        np.stack(rotations, axis=1) if rotations else np.zeros((count, 0, 4)),
+        dict(posing.scales()),
+    )
+
+
+_ALONG: Final = np.array([0.0, 1.0, 0.0])
+_UP: Final = np.array([0.0, 0.0, 1.0])
+
+
+class _Posing:
+    """Bones one after the other, parents before children."""
+
+    def __init__(
+        self,
+        motion: SelfMotion,
+        organs: Organs,
+        skeleton: Skeleton,
+        up: Floats,
+        moments: BodyMoments,
+    ) -> None:
+        self._motion, self._organs, self._skeleton = motion, organs, skeleton
+        self._up, self._moments = up, moments
+        self._settings = motion.settings
+        self.bases: dict[int, Floats] = {}
+        """By bone (moments, 4) from rest."""
+        self._posed: dict[int, Floats] = {}
+        """By bone (moments, 4) in the armature."""
+
+    def turns(self, name: str) -> bool:
+        """Whether a bone is to have a rotation of its own."""
+        settings = self._settings
+        if name in self._organs.eyes:
+            return settings.eyes > 0.0
+        if name == self._organs.siphon:
+            return settings.siphon > 0.0
+        stretched = self._moments.held.shape[1] > 0
+        return stretched or settings.mantle > 0.0 or settings.head > 0.0
+
+    def add(self, bone: int) -> None:
+        """Pose one more."""
+        skeleton, name = self._skeleton, self._skeleton.names[bone]
+        rest = skeleton.rest_rotations[bone]
+        carried = np.broadcast_to(rest, (len(self._moments.times), 4))
+        above = next((each for each in skeleton.ancestors(bone) if each in self._posed), -1)
+        if above >= 0 and skeleton.inherits_rotation[bone]:
+            turn = multiply(self._posed[above], conjugate(skeleton.rest_rotations[above]))
+            carried = multiply(turn, rest)
+        posed = carried
+        if name in self._organs.mantle and self._moments.held.shape[1]:
+            posed = multiply(carried, self._moments.held[:, self._organs.mantle.index(name)])
+        if self.turns(name):
+            posed = multiply(self._turn(bone, name, posed), posed)
+        self._posed[bone] = posed
+        self.bases[bone] = multiply(conjugate(carried), posed)
+
+    def _turn(self, bone: int, name: str, posed: Floats) -> Floats:
+        """What turns (moments, 4) a bone besides what it hangs on, as the armature has it."""
+        if name in self._organs.eyes:
+            return self._look(bone, posed)
+        if name == self._organs.siphon:
+            return from_rotation_vector(self._against(posed))
+        return from_rotation_vector(self._swing(self._organs.mantle.index(name), posed))
+
+    def _swing(self, place: int, posed: Floats) -> Floats:
+        """Rotation vectors (moments, 3) of a bone of the mantle."""
+        motion, many = self._motion, len(self._organs.mantle)
+        swing = motion.at(motion.swing, self._moments.times)
+        along = rotate(posed, _ALONG)
+        back = swing[:, 3:]
+        whole = np.cross(along, swing[:, :3]) + back
+        whole -= np.sum(along * back, axis=1, keepdims=True) * along
+        if many == 1:
+            return whole
+        if place:
+            return (1.0 - _OF_HEAD) / (many - 1) * whole
+        about = self._settings.head * _HEAD_ABOUT * motion.at(motion.about, self._moments.times)
+        turned = motion.at(motion.steady, self._moments.times) + about[:, None] * self._up
+        return _OF_HEAD * whole + turned
+
+    def _against(self, posed: Floats) -> Floats:
+        """Rotation vectors (moments, 3) of the siphon."""
+        motion, times = self._motion, self._moments.times
+        way = motion.at(motion.way, times)
+        jet = -way / (np.linalg.norm(way, axis=1, keepdims=True) + _SLOW)
+        swims = motion.at(motion.track.swimming, times)[:, None]
+        share = _AGAINST_WALK + (1.0 - _AGAINST_WALK) * swims
+        return self._settings.siphon * _AGAINST * share * np.cross(rotate(posed, _ALONG), jet)
+
+    def _look(self, bone: int, posed: Floats) -> Floats:
+        """Turns (moments, 4) of an eye: towards what it looks at, its slit level."""
+        moments, motion, amount = self._moments, self._motion, self._settings.eyes
+        gaze, above = self._rest_gaze(bone)
+        turned = multiply(posed, conjugate(self._skeleton.rest_rotations[bone]))
+        to_world = multiply(moments.orientations, turned)
+        gaze, above = rotate(to_world, gaze), rotate(to_world, above)
+        if moments.look is not None:
+            towards, most = moments.look, _LOOK
+            towards = towards / np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
+        else:
+            way = motion.at(motion.way, moments.times)
+            way = way / (np.linalg.norm(way, axis=1, keepdims=True) + _SLOW)
+            towards, most = rotate(moments.orientations, way), _GLANCE
+        glance = from_rotation_vector(amount * most * np.cross(gaze, towards))
+        if moments.look is None:
+            about = amount * motion.at(motion.about, moments.times)
+            above_it = rotate(moments.orientations, self._up)
+            glance = multiply(from_rotation_vector(about[:, None] * above_it), glance)
+        gaze, above = rotate(glance, gaze), rotate(glance, above)
+        level = _UP - gaze[:, 2:] * gaze
+        roll = np.arctan2(
+            np.sum(np.cross(above, level) * gaze, axis=1), np.sum(above * level, axis=1)
+        )
+        low, high = _SURE
+        sure = smooth_step((np.linalg.norm(level, axis=1) - low) / (high - low))
+        roll = min(amount, 1.0) * sure * np.unwrap(roll)
+        whole = multiply(from_rotation_vector(roll[:, None] * gaze), glance)
+        return multiply(multiply(conjugate(moments.orientations), whole), moments.orientations)
+
+    def _rest_gaze(self, bone: int) -> tuple[Floats, Floats]:
+        """Where an eye looks at rest (3,), and its up (3,), as the armature has them: along its
+        bone, unless that leads into the head.
+        """
+        skeleton = self._skeleton
+        eyes = [skeleton.index[name] for name in self._organs.eyes]
+        gaze = rotate(skeleton.rest_rotations[bone], _ALONG)
+        outward = skeleton.heads[bone] - skeleton.heads[eyes].mean(axis=0)
+        if len(eyes) > 1 and gaze @ normalized(outward) < _OUTWARD:
+            gaze = normalized(outward)
+        return gaze, normalized(self._up - (self._up @ gaze) * gaze)
+
+    def scales(self) -> Iterator[tuple[str, Floats]]:
+        """Of the bones that may get wider or narrower (moments, 3)."""
+        motion, times, organs = self._motion, self._moments.times, self._organs
+        if organs.mantle:
+            filled = motion.at(motion.filled, times)
+            across = 1.0 + filled
+            yield organs.mantle[-1], np.stack([across, 1.0 - _BULGE * filled, across], axis=1)
+        if organs.siphon:
+            puff = 1.0 + _PUFF * self._settings.siphon * motion.at(motion.outflow, times)
+            yield organs.siphon, np.stack([puff, np.ones(len(times)), puff], axis=1)
+        shut = motion.at(motion.shut, times)
+        for place, name in enumerate(organs.eyes if self._settings.eyes > 0.0 else ()):
+            bone = self._skeleton.index[name]
+            axes = self._skeleton.rest_matrices[bone][:3, :3]
+            high = 2 * int(abs(axes[:, 2] @ self._up) >= abs(axes[:, 0] @ self._up))
+            scale = np.ones((len(times), 3))
+            scale[:, high] -= min(self._settings.eyes, 1.0) * _SHUT * shut[:, place]
+            yield name, scale

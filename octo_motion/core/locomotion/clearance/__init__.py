@@ -8,13 +8,14 @@ from .corrections import (
     ArmsOverGround,
     BodyVolume,
     afloat,
+    eased_turns,
     joints_that_count,
     keep_off_ground,
+    largest_turns,
     lead_past,
     raise_between_frames,
     separate_arms,
 )
-from .turn_easing import eased_turns, largest_turns
 
 __all__ = [
     "DEEP",

@@ -456,17 +456,16 @@ class GaitPoser:
         settings, gait = self.settings, self.settings.gait
         steady, period = settings.smoothing_cycles, cycle_period or settings.period
         uneven = settings.uneven * (_RESTING * bool(settings.period) if gait.on_ground else 1.0)
-        phases, angles = unevenness(phases, uneven, settings.seed, cycle_period=period)
-        angles += gait_angles(gait, phases, self._pairs, smoothing_cycles=steady)
-        angles += variation(
-            gait,
-            phases,
-            self._pairs,
-            settings.variation,
-            settings.seed,
-            cycle_period=period,
-            smoothing_cycles=steady,
-        )
+        angles: Floats | float = 0.0
+        if uneven:
+            phases, angles = unevenness(phases, uneven, settings.seed, cycle_period=period)
+        angles = angles + gait_angles(gait, phases, self._pairs, smoothing_cycles=steady)
+        if any(settings.variation):
+            angles = angles + variation(
+                *(gait, phases, self._pairs, settings.variation, settings.seed),
+                cycle_period=period,
+                smoothing_cycles=steady,
+            )
         if not gait.on_ground:
             angles = trailing_beside(angles, self._asides)
         # Towards the goal: by the part of the turn that lies across the arm.

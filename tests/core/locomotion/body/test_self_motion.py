@@ -15,7 +15,7 @@ from octo_motion.core.locomotion.body import (
     self_motion,
     steps_of,
 )
-from octo_motion.core.locomotion.body.track import sprung
+from octo_motion.core.locomotion.body.by_itself import sprung
 from octo_motion.core.locomotion.octopus import OctopusShape, build_bones
 from octo_motion.core.locomotion.rig import BodyFrame, body_frame
 from octo_motion.core.skeleton import Skeleton
