@@ -25,6 +25,7 @@ from .surface import (
     passes_over_itself,
     sample_ground,
 )
+from .unrolled import Unrolled, roll_out
 from .walk import GroundedWalk, SwingSmoothing, frames_around
 
 __all__ = [
@@ -41,6 +42,7 @@ __all__ = [
     "Raise",
     "StanceSettings",
     "SwingSmoothing",
+    "Unrolled",
     "body_line",
     "crawling",
     "crawling_in_place",
@@ -51,6 +53,7 @@ __all__ = [
     "leaning",
     "passes_over_itself",
     "raise_over_ground",
+    "roll_out",
     "sample_ground",
     "span",
     "timing_at_rest",

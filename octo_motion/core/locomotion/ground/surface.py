@@ -593,6 +593,21 @@ class StanceSettings:
         soft_high=2.0,
         step=5,
     )
+    up: str = setting(
+        "Up",
+        "Which way is up for a walk on a mesh: walls, ceilings, pipes and rocks have their own",
+        default="AUTO",
+        items=(
+            (
+                "AUTO",
+                "By Itself",
+                "The ground's own on walls, under ceilings and around rocks, else Z, on hills too",
+                0,
+            ),
+            ("WORLD", "World", "Z, however steep the ground is", 1),
+            ("GROUND", "Ground", "The ground's own up, evened out, on hills and slopes too", 2),
+        ),
+    )
 
     def __post_init__(self) -> None:
         check_settings(self)

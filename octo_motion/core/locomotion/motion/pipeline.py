@@ -28,11 +28,13 @@ from ..clearance import (
     raise_between_frames,
     separate_arms,
 )
+from ..gait import CYCLE
 from ..ground import Ground, sample_ground
 from ..metrics import TOLD, Figure, Measured, figures
 from ..path import bearings_of, plan_travel, travel_at
 from ..reaching import Carried, Reached, Travelling
 from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
+from .carrying import Carry, carried
 from .few_keys import Motion, measure_keyed, reduced
 from .handover import (
     ArmsAround,
@@ -46,7 +48,7 @@ from .handover import (
     handovers,
     near_enough,
 )
-from .job import MotionJob, Tolerances, Trailing
+from .job import Creature, MotionJob, Tolerances, Trailing
 from .planning import MotionPlan, frames_of_arms, plan_motion
 from .segments import SegmentedMotion
 from .trailing import trailed
@@ -161,19 +163,21 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     if posed.hands:
         _hand_over(plan, posed)
     yield moving
-    arms, going, keyed, reached = posed.arms, posed.going, posed.keyed, posed.reached
+    arms, keyed, reached = posed.arms, posed.keyed, posed.reached
     warnings = [*plan.warnings, *posed.warnings]
     motion, further = _motion(plan, posed, moments)
     yield moving
     on_frames = arms.at(slice(None, None, every))
-    framed = going[0][::every], going[1][::every]
-    measured, overlaps = _measured(plan, on_frames, framed, keyed)
+    # The ground is as it was planned on.
+    planned, along = posed.planned or (arms, posed.going)
+    framed = along[0][::every], along[1][::every]
+    measured, overlaps = _measured(plan, planned.at(slice(None, None, every)), framed, keyed)
     # A key at every moment, unless fewer say the same.
     channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.widths, *motion.stretch]
     if reducing:
         yield moving
         channels = yield from _scaled(_reduced(plan, motion, moments, every), moving, 1.0)
-        if measured is not None:
+        if measured is not None and plan.carry is None:
             travels = not plan.job.in_place
             measured = measure_keyed(measured, plan.job.creature, channels, travels=travels)
     # What is in a pose alone is on each frame, however few keys the motion has.
@@ -208,6 +212,8 @@ class _Posed:
     warnings: list[str]
     hands: list[Handover]
     """The poses that it begins and ends in."""
+    planned: tuple[ArmMotion, Travelled] | None
+    """Arms, and the body as it goes, where they were planned; none where that is the world."""
 
 
 def _moments(plan: MotionPlan) -> tuple[Floats, Floats]:
@@ -234,7 +240,7 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
         places = places[0] + offset, places[1]
     creature, hands = job.creature, _handovers(plan, times)
     eased = places
-    if hands and not job.in_place:
+    if hands and not job.in_place and plan.carry is None:
         eased = eased_places(hands, creature.body, creature.scale, places)
         places = near_enough(places, eased, plan.first.poser.arm_length * creature.scale)
     # In place the ground goes by, and arms are measured as if the body went along it.
@@ -249,14 +255,29 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     arms = _cleared(plan, made, going, cyclic=cyclic)
     yield 0.93
     swimming = segments.swimming(travel.distance)
-    reached = _reach(plan, arms, keyed, going)
+    # What is reached for is in the world.
+    reached = _reach(plan, arms, keyed, going) if plan.carry is None else None
     yield 0.96
     warnings = _separate(plan, arms, reached, going, swimming=swimming, cyclic=cyclic)
     yield 0.98
     _take_time(plan, arms, reached, going, cyclic=cyclic)
+    planned = None
+    if plan.carry is not None:
+        planned, arms = (arms, going), arms.copy()
+        going = keyed = _carried(plan, plan.carry, arms, going, travel.distance)
+        reached = _reach(plan, arms, keyed, going)
+        eased = _body_of(creature, going)
+        eased = eased_places(hands, creature.body, creature.scale, eased)
     if hands and not job.in_place:
         keyed = going = object_transforms(creature.body, creature.scale, *eased)
-    return _Posed(arms, going, keyed, swimming, reached, warnings, hands)
+    return _Posed(arms, going, keyed, swimming, reached, warnings, hands, planned)
+
+
+def _body_of(creature: Creature, going: Travelled) -> Travelled:
+    """Centres (moments, 3) and orientations (moments, 4) of the canonical body, world."""
+    body = creature.body
+    centre = going[0] + rotate(going[1], creature.scale * body.center)
+    return centre, multiply(going[1], from_matrix(body.rotation))
 
 
 def _has_poses(plan: MotionPlan) -> bool:
@@ -279,10 +300,28 @@ def _hand_over(plan: MotionPlan, posed: _Posed) -> None:
     creature, ground = plan.job.creature, _underfoot(plan)
     frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
     below = None
-    if ground is not None and not plan.job.in_place:
+    if ground is not None and not plan.job.in_place and plan.carry is None:
         below = ground, plan.standing[0].radii
     around = ArmsAround(creature, frames, posed.going, below)
     hand_over_arms(posed.hands, posed.arms, around)
+
+
+def _carried(
+    plan: MotionPlan, carry: Carry, arms: ArmMotion, going: Travelled, distance: Floats
+) -> Travelled:
+    """Where the armature is in the world; arms are taken there in place."""
+    job, creature = plan.job, plan.job.creature
+    assert job.ground is not None
+    return carried(
+        carry,
+        frames_of_arms(creature.skeleton, creature.arms, creature.body),
+        arms,
+        going,
+        distance,
+        body=creature.body,
+        scale=creature.scale,
+        may_stretch=job.ground.may_stretch,
+    )
 
 
 def glimpse(plan: MotionPlan, frame: float) -> list[Glimpsed]:
@@ -329,8 +368,13 @@ def way_of(plan: MotionPlan) -> tuple[Floats, Floats]:
             travel_at(when.route, when.travel, table, distance, np.zeros(_WAY))
         )
     walks = [walk for walk in plan.segments.walks if walk is not None]
-    held = [each.position for walk in walks for each in walk.footholds()]
-    return centres, np.array(held, dtype=np.float64).reshape(-1, 3)
+    found = [(each.position, each.touch_down) for walk in walks for each in walk.footholds()]
+    held = np.array([each for each, _ in found], dtype=np.float64).reshape(-1, 3)
+    if plan.carry is not None:
+        come = plan.schedule.travel.stride / CYCLE * np.array([each for _, each in found])
+        centres, _ = plan.carry.places(centres, distance)
+        held, _ = plan.carry.places(held, come)
+    return centres, held
 
 
 @dataclass(frozen=True, eq=False)
@@ -446,7 +490,8 @@ def _reach(plan: MotionPlan, arms: ArmMotion, keyed: Travelled, going: Travelled
 
 def _led_past(plan: MotionPlan, arms: ArmMotion, reached: Reached, going: Travelled) -> None:
     """Lead arms that reach past the others, and over the ground."""
-    job, ground, scale = plan.job, _ground(plan), plan.job.creature.scale
+    job, scale = plan.job, plan.job.creature.scale
+    ground = _ground(plan) if plan.carry is None else None
     if job.volume is not None and job.keep_apart:
         past = lead_past(
             job.volume,

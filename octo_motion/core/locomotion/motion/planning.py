@@ -18,7 +18,7 @@ from ...rotations import Floats, multiply, normalized, rotate
 from ...skeleton import Skeleton
 from ..body import BodyTrack, Holds, SelfMotion, Surge, self_motion, steps_of, surge
 from ..gait import CYCLE, Arm, GaitPoser, target_places
-from ..ground import ContactOverride, GroundedWalk
+from ..ground import ContactOverride, GroundedWalk, Unrolled, roll_out
 from ..path import (
     Course,
     GaitTransition,
@@ -49,11 +49,13 @@ from ..rig import (
     object_transforms,
     stretch_mantle,
 )
+from .carrying import Carry
 from .job import ChangesByHeight, GaitJob, MotionJob, ShownContact, Timing, Tolerances
 from .segments import Gait, Segments, Standing, Transitions, stand
 
 _posers: Final[ContentCache[GaitPoser]] = ContentCache(12)
 
+_unrolled_known: Final[ContentCache[tuple[Unrolled, Floats] | None]] = ContentCache(2)
 _frames_known: Final[ContentCache[list[ArmFrames]]] = ContentCache(4)
 
 
@@ -184,6 +186,8 @@ class MotionPlan:
     surge: Surge | None
     """How far the body is from its place, as its arms push it; none for nowhere."""
     warnings: tuple[str, ...]
+    carry: Carry | None = None
+    """What takes the motion from the plan to the world; none where they are the same."""
 
     @property
     def first(self) -> Gait:
@@ -270,6 +274,8 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
+    job, carry = _planned(job)
+    yield 0.0
     when = schedule(job)
     route, lean = when.route, when.lean
     plane = None
@@ -313,9 +319,42 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         self_motion=_self_motion(job, when, segments, pushed),
         surge=pushed,
         warnings=tuple(warnings),
+        carry=carry,
     )
     yield 1.0
     return plan
+
+
+def _planned(job: MotionJob) -> tuple[MotionJob, Carry | None]:
+    """The same motion on its ground rolled out, where that has an up of its own."""
+    ground, route = job.ground, job.route
+    if ground is None or ground.mesh is None or route is None or ground.stance.up == "WORLD":
+        return job, None
+    triangles, content = ground.mesh
+    reach, always = _arm_length(job) * job.creature.scale, ground.stance.up == "GROUND"
+    beyond = max(each.travel.stride for each in job.gaits) * reach + reach
+    sizes = reach, beyond, always
+
+    def made() -> tuple[Unrolled, Floats] | None:
+        space = roll_out(route, triangles, reach=reach, beyond=beyond, always=always)
+        return None if space is None else (space, space.faces(triangles)[0])
+
+    key = content_key(content, route.controls, route.breaks, route.cyclic, *sizes)
+    if (found := _unrolled_known.get(key, made)) is None:
+        return job, None
+    space, faces = found
+    overrides = tuple(_in_plan(each, space) for each in ground.overrides)
+    ground = replace(ground, mesh=(faces, key), overrides=overrides)
+    return replace(job, route=space.route(route), ground=ground), Carry(space)
+
+
+def _in_plan(override: ContactOverride, space: Unrolled) -> ContactOverride:
+    """What the artist wants of a foothold, in the plan."""
+    if override.position is None:
+        return override
+    apart = np.linalg.norm(space.world - override.position, axis=1)
+    along = np.array([space.start + space.spacing * float(apart.argmin())])
+    return replace(override, position=space.to_plan(override.position[None], along)[0][0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -680,12 +719,16 @@ def shown_contacts(plan: MotionPlan) -> list[ShownContact]:
     phases, first = np.unique(travel.phase, return_index=True)
     contacts = []
     for each in walk.footholds():
+        place = each.position
+        if plan.carry is not None:
+            come = np.array(0.5 * (each.touch_down + each.lift_off) * when.travel.stride / CYCLE)
+            place, _ = plan.carry.places(place, come)
         on, off = np.interp([each.touch_down, each.lift_off], phases, when.frames[first])
         contacts.append(
             ShownContact(
                 plan.job.creature.arms[each.arm].name,
                 each.cycle,
-                each.position,
+                place,
                 each.heading,
                 frame_on=float(on),
                 frame_off=float(off),

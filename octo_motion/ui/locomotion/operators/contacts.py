@@ -167,6 +167,9 @@ class OCTO_MOTION_PT_ground(ArmaturePanel, bpy.types.Panel):
             column = layout.column(align=True)
             for name in names:
                 column.prop(ground, name)
+        column = layout.column()
+        column.active = ground.object is not None
+        column.prop(ground, "up")
         row = layout.row(align=True)
         if ground.shown:
             row.operator(OCTO_MOTION_OT_contacts_hide.bl_idname, icon="HIDE_ON")

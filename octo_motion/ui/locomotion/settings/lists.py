@@ -88,6 +88,7 @@ class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
     lift: declared(StanceSettings, "lift")
     lean: declared(StanceSettings, "lean")
     smoothing: declared(StanceSettings, "smoothing")
+    up: declared(StanceSettings, "up")
     start_at_rest: props.BoolProperty(
         name="Start at Rest",
         description="All arms lie on the ground at the start, and leave it as the body gets going. "

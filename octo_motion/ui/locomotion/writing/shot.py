@@ -263,6 +263,9 @@ class Shot:
         made = self.result
         if made is None or made.measured is None or not self.plays_otherwise():
             return
+        if made.plan.carry is not None:
+            # Figures are of the ground as it was planned on.
+            return
         arms = self.job.creature.arms
         names = [name for arm in arms for name in arm.bones]
         starts = np.cumsum([len(arm.bones) for arm in arms])[:-1]

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A motion taken from where it was planned to where it plays: rolled up onto its ground again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from ...rotations import Floats, multiply, normalized, rotate, shortest_arc, slerp
+from ...smoothing import smooth_step
+from ..ground import Unrolled
+from ..rig import ArmFrames, ArmMotion, BodyFrame
+
+_ATTACHED: Final = 0.4
+"""Share of an arm from its root over which it passes from its body's turn to the ground's."""
+_PASSES: Final = 4
+"""Times that an arm which must not stretch is led from its root to its tip and back."""
+
+
+@dataclass(frozen=True, eq=False)
+class Carry:
+    """What takes a motion to where it plays."""
+
+    unrolled: Unrolled
+
+    def places(self, points: Floats, distance: Floats) -> tuple[Floats, Floats]:
+        """Where points (moments, …, 3) of the plan are in the world, and turns (moments, …, 4) that
+        lead there, about a body that has come so far (moments,).
+        """
+        along = np.broadcast_to(distance.reshape(-1, *[1] * (points.ndim - 2)), points.shape[:-1])
+        return self.unrolled.to_world(points, along), self.unrolled.turns_at(points, along)
+
+
+def carried(
+    carry: Carry,
+    frames: Sequence[ArmFrames],
+    arms: ArmMotion,
+    going: tuple[Floats, Floats],
+    distance: Floats,
+    *,
+    body: BodyFrame,
+    scale: float,
+    may_stretch: Sequence[bool],
+) -> tuple[Floats, Floats]:
+    """Where the armature is in the world, locations (moments, 3) and orientations (moments, 4);
+    arms are changed in place.
+
+    The body goes as one piece; arms leave it as it turns and lie as their ground does, and what
+    rests in the plan rests in the world.
+
+    Args:
+        carry: to the world.
+        frames: of each arm.
+        arms: as they were planned.
+        going: locations and orientations of the armature in the plan.
+        distance: (moments,) metres that the body has come.
+        body: where it is in the armature.
+        scale: metres of the armature's unit.
+        may_stretch: of each arm.
+    """
+    centre = going[0] + rotate(going[1], scale * body.center)
+    place, turn = carry.places(centre, distance)
+    location = place + rotate(turn, going[0] - centre)
+    start = 0
+    for arm, stretches in zip(frames, may_stretch, strict=True):
+        own = slice(start, start + len(arm.bones))
+        start = own.stop
+        bones = multiply(going[1][:, None], arm.from_bones(arms.rotations[:, own]))
+        lengths = scale * arm.lengths * (1.0 + arms.strains[:, own])
+        root = going[0] + rotate(going[1], scale * arm.root)
+        steps = np.cumsum(lengths[..., None] * rotate(bones, _ALONG), axis=1)
+        joints = np.concatenate([root[:, None], root[:, None] + steps], axis=1)
+        there, turns = carry.places(joints, distance)
+        with_body = place[:, None] + rotate(turn[:, None], joints - centre[:, None])
+        share = smooth_step(arm.reach / (_ATTACHED * arm.length))[None]
+        there = with_body + share[..., None] * (there - with_body)
+        turns = slerp(
+            np.broadcast_to(turn[:, None], turns.shape),
+            turns,
+            np.broadcast_to(share, turns.shape[:2]),
+        )
+        if not stretches:
+            there = _led(there, lengths)
+        ways = np.diff(there, axis=1)
+        middle = normalized(turns[:, :-1] + _alike(turns[:, 1:], turns[:, :-1]))
+        bones = multiply(middle, bones)
+        bones = multiply(shortest_arc(rotate(bones, _ALONG), normalized(ways)), bones)
+        world = multiply(turn, going[1])
+        back = world * np.array([1.0, -1.0, -1.0, -1.0])
+        arms.rotations[:, own] = arm.to_bones(multiply(back[:, None], bones))
+        if stretches:
+            arms.strains[:, own] = np.linalg.norm(ways, axis=-1) / (scale * arm.lengths) - 1.0
+    return location, multiply(turn, going[1])
+
+
+_ALONG: Final = np.array([1.0, 0.0, 0.0])
+
+
+def _alike(turns: Floats, others: Floats) -> Floats:
+    """Quaternions (…, 4) of the sign of others."""
+    return np.where(np.sum(turns * others, axis=-1, keepdims=True) < 0.0, -turns, turns)
+
+
+def _led(joints: Floats, lengths: Floats) -> Floats:
+    """Joints (moments, bones + 1, 3) of a chain with bones of these lengths (moments, bones), from
+    the same root to the same tip as far as they reach, along the joints given.
+    """
+    result = joints.copy()
+    for _ in range(_PASSES):
+        for bone in range(lengths.shape[1] - 1, -1, -1):
+            way = normalized(result[:, bone] - result[:, bone + 1])
+            result[:, bone] = result[:, bone + 1] + lengths[:, bone, None] * way
+        result[:, 0] = joints[:, 0]
+        for bone in range(lengths.shape[1]):
+            way = normalized(result[:, bone + 1] - result[:, bone])
+            result[:, bone + 1] = result[:, bone] + lengths[:, bone, None] * way
+    return result
