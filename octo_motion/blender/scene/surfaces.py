@@ -15,7 +15,9 @@ from ...core.errors import GroundError, RigError
 from ...core.phrases import phrase
 from ...core.posing.solver import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
 from ...core.rotations import Floats, from_matrix
+from ..animation import time_kept
 from ..rig import vertex_positions, world_of
+from .grasp_target import may_move
 
 
 def is_enabled(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
@@ -88,6 +90,62 @@ def _corners(mesh: bpy.types.Mesh, points: np.ndarray) -> tuple[np.ndarray, byte
     attribute.data.foreach_get("value", vertices)
     content = content_key(points, starts, vertices)
     return _corners_known.get(content, read), content
+
+
+_DEFORMS: Final = frozenset(
+    {
+        *("ARMATURE", "CAST", "CLOTH", "CURVE", "DISPLACE", "DYNAMIC_PAINT", "FLUID", "HOOK"),
+        *("LATTICE", "MESH_CACHE", "MESH_DEFORM", "MESH_SEQUENCE_CACHE", "NODES", "OCEAN"),
+        *("SHRINKWRAP", "SIMPLE_DEFORM", "SOFT_BODY", "SURFACE_DEFORM", "WARP", "WAVE"),
+    }
+)
+"""Modifiers that may make another mesh of the same vertices at another frame."""
+_LOOKS: Final = np.array([0.0, 0.29, 0.62, 1.0])
+"""Shares of the frames at which it is looked whether it does."""
+
+
+def read_motion(ground: bpy.types.Object, frames: Floats) -> tuple[np.ndarray, np.ndarray] | None:
+    """How a mesh object moves and deforms: its vertices (n, vertices, 3) at frames (n,), world, and
+    those of its triangles (faces, 3); none where it stays as it is.
+
+    Raises:
+        GroundError: it has other vertices or faces from frame to frame.
+    """
+    data = ground.data
+    assert isinstance(data, bpy.types.Mesh)
+    keys = data.shape_keys
+    animated = data.animation_data or (keys is not None and keys.animation_data)
+    deforms = any(each.type in _DEFORMS and each.show_viewport for each in ground.modifiers)
+    if not (may_move(ground) or animated or deforms):
+        return None
+    scene = bpy.context.scene
+    assert scene is not None
+    with time_kept(scene) as go_to:
+
+        def read(frame: float) -> tuple[np.ndarray, np.ndarray]:
+            go_to(frame)
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            mesh = ground.evaluated_get(depsgraph).to_mesh()
+            assert mesh is not None
+            points = vertex_positions(mesh)
+            corners = np.empty((len(mesh.loop_triangles), 3), dtype=np.int32)
+            mesh.loop_triangles.foreach_get("vertices", corners.ravel())
+            ground.evaluated_get(depsgraph).to_mesh_clear()
+            world = np.array(world_of(ground, depsgraph), dtype=np.float64)
+            return (points @ world[:3, :3].T + world[:3, 3]).astype(np.float32), corners
+
+        looked = [read(float(frame)) for frame in np.quantile(frames, _LOOKS)]
+        first, corners = looked[0]
+        for points, others in looked[1:]:
+            if points.shape != first.shape or len(others) != len(corners):
+                raise GroundError(
+                    phrase("The ground '{ground}' changes its faces.", ground=ground.name),
+                    "Choose a mesh that keeps its vertices, or apply the modifier that changes "
+                    "them.",
+                )
+        if all(np.array_equal(points, first) for points, _ in looked):
+            return None
+        return np.stack([read(float(frame))[0] for frame in frames]), corners
 
 
 # --- Objects that the artist has marked as solid, as obstacles for a puppet -----------------------

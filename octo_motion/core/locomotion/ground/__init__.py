@@ -15,9 +15,11 @@ from .contact_timing import (
 )
 from .crawl_planner import CrawlSettings
 from .footholds import ContactOverride, easy_height, span
+from .moving import Carpet, MovingMesh, turn_between
 from .surface import (
     Ground,
     GroundedPoses,
+    HeightField,
     LevelGround,
     Raise,
     StanceSettings,
@@ -30,6 +32,7 @@ from .walk import GroundedWalk, SwingSmoothing, frames_around
 
 __all__ = [
     "BodyLine",
+    "Carpet",
     "ContactOverride",
     "ContactTiming",
     "CrawlSettings",
@@ -38,7 +41,9 @@ __all__ = [
     "Ground",
     "GroundedPoses",
     "GroundedWalk",
+    "HeightField",
     "LevelGround",
+    "MovingMesh",
     "Raise",
     "StanceSettings",
     "SwingSmoothing",
@@ -57,4 +62,5 @@ __all__ = [
     "sample_ground",
     "span",
     "timing_at_rest",
+    "turn_between",
 ]

@@ -363,10 +363,21 @@ def _nearest(grid: HeightField, points: Floats) -> tuple[np.ndarray, np.ndarray]
 def _extent(triangles: Floats, grid: HeightField) -> tuple[Floats, Floats]:
     """Lowest and highest of all faces at each sample (nx, ny); +∞ and −∞ where there is none."""
     lowest, highest = np.full(grid.heights.size, np.inf), np.full(grid.heights.size, -np.inf)
-    for place, z in _hits(triangles, grid):
+    for place, z, _ in _hits(triangles, grid):
         np.minimum.at(lowest, place, z)
         np.maximum.at(highest, place, z)
     return lowest.reshape(grid.heights.shape), highest.reshape(grid.heights.shape)
+
+
+def faces_of(triangles: Floats, ground: HeightField) -> np.ndarray:
+    """Which of the faces (faces, 3, 3) that a ground is of is at each sample (nx, ny), -1 for none
+    of them.
+    """
+    found, heights = np.full(ground.heights.size, -1), ground.heights.ravel()
+    for place, z, face in _hits(triangles, ground):
+        same = np.abs(z - heights[place]) <= _ONE * ground.spacing
+        found[place[same]] = face[same]
+    return found.reshape(ground.heights.shape)
 
 
 def _single(grid: HeightField, lowest: Floats, highest: Floats) -> HeightField | None:
@@ -391,7 +402,7 @@ def _beneath(
     if np.any(between):
         # Only where faces are on both sides does it matter which ones there are.
         below, limit = np.full(heights.size, -np.inf), ceiling.ravel()
-        for place, z in _hits(triangles, grid):
+        for place, z, _ in _hits(triangles, grid):
             low = z <= limit[place]
             np.maximum.at(below, place[low], z[low])
         heights[between] = below.reshape(heights.shape)[between]
@@ -402,6 +413,8 @@ def _beneath(
 class _Faces:
     """Faces as they lie over a grid, each (faces,)."""
 
+    number: np.ndarray
+    """Which of all they are."""
     first: np.ndarray
     """Number of the first sample that may lie on it."""
     columns: np.ndarray
@@ -417,8 +430,10 @@ class _Faces:
     """World Z of the first corner, and of the others above it."""
 
 
-def _hits(triangles: Floats, grid: HeightField) -> Iterator[tuple[np.ndarray, Floats]]:
-    """Numbers of samples and heights there, of faces that lie over or under them, in blocks."""
+def _hits(triangles: Floats, grid: HeightField) -> Iterator[tuple[np.ndarray, Floats, np.ndarray]]:
+    """Numbers of samples, heights there and numbers of faces that lie over or under them, in
+    blocks.
+    """
     faces, width = _over(triangles, grid), grid.heights.shape[1]
     longest = np.maximum(faces.columns, faces.rows)
     size, done = 1, 0
@@ -434,7 +449,7 @@ def _hits(triangles: Floats, grid: HeightField) -> Iterator[tuple[np.ndarray, Fl
                 second, third = _nearness(part, slice(None), column, row)
                 hit = np.flatnonzero(over & _inside(second, third))
                 height = _height(part, hit, second[hit], third[hit])
-                yield part.first[hit] + (column * width + row), height
+                yield part.first[hit] + (column * width + row), height, part.number[hit]
         done = size
     large = np.flatnonzero(longest > _SIDE)
     counts = faces.columns[large] * faces.rows[large]
@@ -448,12 +463,14 @@ def _hits(triangles: Floats, grid: HeightField) -> Iterator[tuple[np.ndarray, Fl
         second, third = _nearness(faces, face, column, row)
         hit = np.flatnonzero(_inside(second, third))
         face, place = face[hit], column[hit] * width + row[hit]
-        yield faces.first[face] + place, _height(faces, face, second[hit], third[hit])
+        height = _height(faces, face, second[hit], third[hit])
+        yield faces.first[face] + place, height, faces.number[face]
 
 
 def _over(triangles: Floats, grid: HeightField) -> _Faces:
     """The faces that may lie over some sample of a grid; none with a corner that is nowhere."""
     known = np.isfinite(triangles).all(axis=(1, 2))
+    numbers = np.flatnonzero(known)
     if not known.all():
         triangles = triangles[known]
     (x0, x1, x2), (y0, y1, y2) = (
@@ -477,6 +494,7 @@ def _over(triangles: Floats, grid: HeightField) -> _Faces:
     x, y = column - x0, row - y0
     z0, z1, z2 = (triangles[kept, corner, 2] for corner in range(3))
     return _Faces(
+        numbers[kept],
         (column * grid.heights.shape[1] + row).astype(np.int64),
         columns.astype(np.int64),
         rows.astype(np.int64),

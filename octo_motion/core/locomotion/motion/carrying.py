@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from ...rotations import Floats, multiply, normalized, rotate, shortest_arc, slerp
+from ...rotations import IDENTITY, Floats, multiply, normalized, rotate, shortest_arc, slerp
 from ...smoothing import smooth_step
-from ..ground import Unrolled
+from ..ground import Carpet, Unrolled, turn_between
 from ..rig import ArmFrames, ArmMotion, BodyFrame
 
 _ATTACHED: Final = 0.4
@@ -20,26 +20,71 @@ _PASSES: Final = 4
 """Times that an arm which must not stretch is led from its root to its tip and back."""
 
 
+_NEAR: Final = 0.25
+"""Arm lengths about a joint in which ground that moves is looked at for how it turns …"""
+_WIDE: Final = 0.5
+"""… and about the body, which rides on all of it."""
+_CROSS: Final = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [0.0, 0.0]])
+
+
 @dataclass(frozen=True, eq=False)
 class Carry:
-    """What takes a motion to where it plays."""
+    """What takes a motion to where it plays: first onto its ground, then along with it."""
 
-    unrolled: Unrolled
+    unrolled: Unrolled | None
+    """None where the plan is the world."""
+    reach: float
+    """Metres that arms are long."""
+    carpet: Carpet | None = None
+    """None where the ground stays."""
 
-    def places(self, points: Floats, distance: Floats) -> tuple[Floats, Floats]:
+    def places(
+        self, points: Floats, distance: Floats, frames: Floats | None = None, *, wide: bool = False
+    ) -> tuple[Floats, Floats]:
         """Where points (moments, …, 3) of the plan are in the world, and turns (moments, …, 4) that
         lead there, about a body that has come so far (moments,).
+
+        At frames (moments,), or before the ground moves. Wide, they ride on the ground about them,
+        else on that right below them.
         """
-        along = np.broadcast_to(distance.reshape(-1, *[1] * (points.ndim - 2)), points.shape[:-1])
+        shape, ones = points.shape[:-1], [1] * (points.ndim - 2)
+        along = np.broadcast_to(distance.reshape(-1, *ones), shape)
+        there, turns = self._up(points, along)
+        if self.carpet is None or frames is None:
+            return there, turns
+        flat, when = points.reshape(-1, 3), np.broadcast_to(frames.reshape(-1, *ones), shape)
+        before, after = (
+            np.empty((len(flat), len(_CROSS), 3)),
+            np.empty((len(flat), len(_CROSS), 3)),
+        )
+        size = (_WIDE if wide else _NEAR) * self.reach
+        for number, step in enumerate(_CROSS):
+            samples, faces, weights = self.carpet.around(flat[:, :2] + size * step)
+            world, _ = self._up(samples, np.repeat(along.reshape(-1, 1), 4, axis=1))
+            moved = self.carpet.moved(world, faces, when.reshape(-1))
+            before[:, number] = np.einsum("nk,nkc->nc", weights, world)
+            after[:, number] = np.einsum("nk,nkc->nc", weights, moved)
+        turn = turn_between(before[:, :4], after[:, :4]).reshape(turns.shape)
+        start, end = (
+            (each.mean(axis=1) if wide else each[:, 4]).reshape(points.shape)
+            for each in (before, after)
+        )
+        return end + rotate(turn, there - start), multiply(turn, turns)
+
+    def _up(self, points: Floats, along: Floats) -> tuple[Floats, Floats]:
+        """Where points (…, 3) of the plan are before the ground moves, and turns (…, 4)."""
+        if self.unrolled is None:
+            return points, np.broadcast_to(IDENTITY, (*points.shape[:-1], 4))
         return self.unrolled.to_world(points, along), self.unrolled.turns_at(points, along)
 
 
-def carried(
+def carried(  # noqa: PLR0917 - what is carried, where it is, and when
     carry: Carry,
     frames: Sequence[ArmFrames],
     arms: ArmMotion,
     going: tuple[Floats, Floats],
     distance: Floats,
+    at: Floats,
     *,
     body: BodyFrame,
     scale: float,
@@ -57,12 +102,13 @@ def carried(
         arms: as they were planned.
         going: locations and orientations of the armature in the plan.
         distance: (moments,) metres that the body has come.
+        at: (moments,) frames, which need not be whole.
         body: where it is in the armature.
         scale: metres of the armature's unit.
         may_stretch: of each arm.
     """
     centre = going[0] + rotate(going[1], scale * body.center)
-    place, turn = carry.places(centre, distance)
+    place, turn = carry.places(centre, distance, at, wide=True)
     location = place + rotate(turn, going[0] - centre)
     start = 0
     for arm, stretches in zip(frames, may_stretch, strict=True):
@@ -73,7 +119,7 @@ def carried(
         root = going[0] + rotate(going[1], scale * arm.root)
         steps = np.cumsum(lengths[..., None] * rotate(bones, _ALONG), axis=1)
         joints = np.concatenate([root[:, None], root[:, None] + steps], axis=1)
-        there, turns = carry.places(joints, distance)
+        there, turns = carry.places(joints, distance, at)
         with_body = place[:, None] + rotate(turn[:, None], joints - centre[:, None])
         share = smooth_step(arm.reach / (_ATTACHED * arm.length))[None]
         there = with_body + share[..., None] * (there - with_body)

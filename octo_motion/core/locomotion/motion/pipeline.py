@@ -31,7 +31,7 @@ from ..clearance import (
 from ..gait import CYCLE
 from ..ground import Ground, sample_ground
 from ..metrics import TOLD, Figure, Measured, figures
-from ..path import bearings_of, plan_travel, travel_at
+from ..path import Travel, bearings_of, plan_travel, travel_at
 from ..reaching import Carried, Reached, Travelling
 from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
 from .carrying import Carry, carried
@@ -264,7 +264,7 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     planned = None
     if plan.carry is not None:
         planned, arms = (arms, going), arms.copy()
-        going = keyed = _carried(plan, plan.carry, arms, going, travel.distance)
+        going = keyed = _carried(plan, plan.carry, arms, going, travel)
         reached = _reach(plan, arms, keyed, going)
         eased = _body_of(creature, going)
         eased = eased_places(hands, creature.body, creature.scale, eased)
@@ -307,7 +307,7 @@ def _hand_over(plan: MotionPlan, posed: _Posed) -> None:
 
 
 def _carried(
-    plan: MotionPlan, carry: Carry, arms: ArmMotion, going: Travelled, distance: Floats
+    plan: MotionPlan, carry: Carry, arms: ArmMotion, going: Travelled, travel: Travel
 ) -> Travelled:
     """Where the armature is in the world; arms are taken there in place."""
     job, creature = plan.job, plan.job.creature
@@ -317,7 +317,8 @@ def _carried(
         frames_of_arms(creature.skeleton, creature.arms, creature.body),
         arms,
         going,
-        distance,
+        travel.distance,
+        np.interp(travel.times, plan.schedule.times, plan.schedule.frames),
         body=creature.body,
         scale=creature.scale,
         may_stretch=job.ground.may_stretch,
@@ -591,7 +592,8 @@ def _take_time(
 
 def _trail(plan: MotionPlan, trailing: Trailing, posed: _Posed) -> Steps[None]:
     """Let outer parts of free arms follow, over the ground."""
-    job, creature, arms, ground = plan.job, plan.job.creature, posed.arms, _underfoot(plan)
+    job, creature, arms = plan.job, plan.job.creature, posed.arms
+    ground = _underfoot(plan) if plan.carry is None else None
     away = posed.reached.away if posed.reached is not None else np.zeros(arms.late.shape)
     held = [
         lying.any(axis=1) | (own > 0.0) for lying, own in zip(arms.in_contact, away.T, strict=True)

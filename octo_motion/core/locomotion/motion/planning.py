@@ -18,7 +18,14 @@ from ...rotations import Floats, multiply, normalized, rotate
 from ...skeleton import Skeleton
 from ..body import BodyTrack, Holds, SelfMotion, Surge, self_motion, steps_of, surge
 from ..gait import CYCLE, Arm, GaitPoser, target_places
-from ..ground import ContactOverride, GroundedWalk, Unrolled, roll_out
+from ..ground import (
+    Carpet,
+    ContactOverride,
+    GroundedWalk,
+    HeightField,
+    Unrolled,
+    roll_out,
+)
 from ..path import (
     Course,
     GaitTransition,
@@ -55,7 +62,7 @@ from .segments import Gait, Segments, Standing, Transitions, stand
 
 _posers: Final[ContentCache[GaitPoser]] = ContentCache(12)
 
-_unrolled_known: Final[ContentCache[tuple[Unrolled, Floats] | None]] = ContentCache(2)
+_unrolled_known: Final[ContentCache[tuple[Unrolled, Floats, np.ndarray] | None]] = ContentCache(2)
 _frames_known: Final[ContentCache[list[ArmFrames]]] = ContentCache(4)
 
 
@@ -274,7 +281,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
-    job, carry = _planned(job)
+    job, carry, faces = _planned(job)
     yield 0.0
     when = schedule(job)
     route, lean = when.route, when.lean
@@ -319,33 +326,51 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         self_motion=_self_motion(job, when, segments, pushed),
         surge=pushed,
         warnings=tuple(warnings),
-        carry=carry,
+        carry=_along(job, carry, faces, standing),
     )
     yield 1.0
     return plan
 
 
-def _planned(job: MotionJob) -> tuple[MotionJob, Carry | None]:
-    """The same motion on its ground rolled out, where that has an up of its own."""
+def _along(
+    job: MotionJob, carry: Carry | None, source: np.ndarray | None, standing: Standing | None
+) -> Carry | None:
+    """What carries the motion, its ground's own motion too."""
+    ground = job.ground
+    if ground is None or ground.moving is None or ground.mesh is None or standing is None:
+        return carry
+    if not isinstance(standing.ground, HeightField):
+        return carry
+    faces = ground.mesh[0]
+    source = np.arange(len(faces)) if source is None else source
+    carpet = Carpet.of(ground.moving, standing.ground, faces, source)
+    reach = _arm_length(job) * job.creature.scale
+    return Carry(carry.unrolled if carry is not None else None, reach, carpet)
+
+
+def _planned(job: MotionJob) -> tuple[MotionJob, Carry | None, np.ndarray | None]:
+    """The same motion on its ground rolled out, where that has an up of its own; then which of its
+    faces each one of the plan is from.
+    """
     ground, route = job.ground, job.route
     if ground is None or ground.mesh is None or route is None or ground.stance.up == "WORLD":
-        return job, None
+        return job, None, None
     triangles, content = ground.mesh
     reach, always = _arm_length(job) * job.creature.scale, ground.stance.up == "GROUND"
     beyond = max(each.travel.stride for each in job.gaits) * reach + reach
     sizes = reach, beyond, always
 
-    def made() -> tuple[Unrolled, Floats] | None:
+    def made() -> tuple[Unrolled, Floats, np.ndarray] | None:
         space = roll_out(route, triangles, reach=reach, beyond=beyond, always=always)
-        return None if space is None else (space, space.faces(triangles)[0])
+        return None if space is None else (space, *space.faces(triangles))
 
     key = content_key(content, route.controls, route.breaks, route.cyclic, *sizes)
     if (found := _unrolled_known.get(key, made)) is None:
-        return job, None
-    space, faces = found
+        return job, None, None
+    space, faces, source = found
     overrides = tuple(_in_plan(each, space) for each in ground.overrides)
     ground = replace(ground, mesh=(faces, key), overrides=overrides)
-    return replace(job, route=space.route(route), ground=ground), Carry(space)
+    return replace(job, route=space.route(route), ground=ground), Carry(space, reach), source
 
 
 def _in_plan(override: ContactOverride, space: Unrolled) -> ContactOverride:

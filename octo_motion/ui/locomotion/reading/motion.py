@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final, cast
 
 import bpy
@@ -19,15 +20,17 @@ from ....blender.scene import (
     is_carried,
     is_enabled,
     read_form,
+    read_motion,
     read_places,
     read_triangles,
 )
+from ....core.content_cache import content_key
 from ....core.errors import GroundError, SettingsError
 from ....core.follow_through import limbs_of
 from ....core.keyframes import check_bounds
 from ....core.locomotion.body import BodySettings, find_organs
 from ....core.locomotion.gait import GaitSettings, GaitTable
-from ....core.locomotion.ground import StanceSettings
+from ....core.locomotion.ground import MovingMesh, StanceSettings
 from ....core.locomotion.motion import (
     BodyJob,
     Breathing,
@@ -358,6 +361,25 @@ def read_ground(
         rest_within=ground.rest_within,
         warnings=warnings,
     )
+
+
+def read_moving(
+    ground: GroundJob, armature: bpy.types.Object, obj: bpy.types.Object | None, frames: Floats
+) -> GroundJob:
+    """The same ground as it is at the first of some frames (n,), and how it moves over all of them.
+
+    One that hangs on the creature that walks on it is taken as it is.
+
+    Raises:
+        GroundError: it has other vertices or faces from frame to frame.
+    """
+    if ground.mesh is None or obj is None or hangs_on(obj, armature):
+        return ground
+    if (read := read_motion(obj, frames)) is None:
+        return ground
+    moving = MovingMesh(frames, *read)
+    triangles = moving.triangles
+    return replace(ground, mesh=(triangles, content_key(triangles)), moving=moving)
 
 
 def read_floor(

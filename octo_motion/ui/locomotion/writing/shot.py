@@ -59,6 +59,7 @@ from ..reading import (
     read_given_poses,
     read_ground,
     read_look,
+    read_moving,
     read_reaches,
     read_timing,
     read_volume,
@@ -535,6 +536,9 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         look = replace(job.body, look_at=read_look(settings, armature, frames))
         reaching = read_reaches(armature, settings, found, frames)
         job = replace(job, reaching=reaching, body=look)
+    if job.ground is not None and job.ground.mesh is not None:
+        frames, ground = schedule(job).frames, settings.ground.object
+        job = replace(job, ground=read_moving(job.ground, armature, ground, frames))
     return Shot(
         armature=armature.name,
         scene=scene.name,
