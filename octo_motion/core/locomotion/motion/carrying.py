@@ -123,11 +123,8 @@ def carried(  # noqa: PLR0917 - what is carried, where it is, and when
         with_body = place[:, None] + rotate(turn[:, None], joints - centre[:, None])
         share = smooth_step(arm.reach / (_ATTACHED * arm.length))[None]
         there = with_body + share[..., None] * (there - with_body)
-        turns = slerp(
-            np.broadcast_to(turn[:, None], turns.shape),
-            turns,
-            np.broadcast_to(share, turns.shape[:2]),
-        )
+        with_turn = np.broadcast_to(turn[:, None], turns.shape)
+        turns = slerp(with_turn, turns, np.broadcast_to(share, turns.shape[:2]))
         if not stretches:
             there = _led(there, lengths)
         ways = np.diff(there, axis=1)

@@ -536,9 +536,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         look = replace(job.body, look_at=read_look(settings, armature, frames))
         reaching = read_reaches(armature, settings, found, frames)
         job = replace(job, reaching=reaching, body=look)
-    if job.ground is not None and job.ground.mesh is not None:
-        frames, ground = schedule(job).frames, settings.ground.object
-        job = replace(job, ground=read_moving(job.ground, armature, ground, frames))
+    job = _with_motion_of_ground(job, armature, settings.ground.object)
     return Shot(
         armature=armature.name,
         scene=scene.name,
@@ -550,6 +548,7 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     )
 
 
+<<<<<<< HEAD
 def rerouted(shot: Shot, armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
     """A shot of which nothing but the route has changed since it was read, on its route as it is.
 
@@ -565,6 +564,16 @@ def rerouted(shot: Shot, armature: bpy.types.Object, context: bpy.types.Context)
     _write_back(settings.route)
     route = read_route(settings.route, context.evaluated_depsgraph_get(), settings.spline)
     return replace(shot, job=replace(job, route=route))
+=======
+def _with_motion_of_ground(
+    job: MotionJob, armature: bpy.types.Object, ground: bpy.types.Object | None
+) -> MotionJob:
+    """The same motion, on ground that moves meanwhile if it does."""
+    if job.ground is None or job.ground.mesh is None:
+        return job
+    moving = read_moving(job.ground, armature, ground, schedule(job).frames)
+    return replace(job, ground=moving)
+>>>>>>> 1dc2e54 (Generate reads how its ground moves in a step of its own)
 
 
 def _write_back(*objects: bpy.types.Object | None) -> None:
