@@ -548,7 +548,6 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     )
 
 
-<<<<<<< HEAD
 def rerouted(shot: Shot, armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
     """A shot of which nothing but the route has changed since it was read, on its route as it is.
 
@@ -557,14 +556,16 @@ def rerouted(shot: Shot, armature: bpy.types.Object, context: bpy.types.Context)
     """
     job, settings = shot.job, locomotion_settings(armature)
     read = job.reaching, job.body.look_at, job.begin, job.end
-    if job.route is None or any(each is not None for each in read):
+    moves = job.ground is not None and job.ground.moving is not None
+    if moves or job.route is None or any(each is not None for each in read):
         # What moves meanwhile is read at the frames of the motion, and poses where they are.
         return prepare(armature, context, live=job.live)
     _check_route(settings, armature)
     _write_back(settings.route)
     route = read_route(settings.route, context.evaluated_depsgraph_get(), settings.spline)
     return replace(shot, job=replace(job, route=route))
-=======
+
+
 def _with_motion_of_ground(
     job: MotionJob, armature: bpy.types.Object, ground: bpy.types.Object | None
 ) -> MotionJob:
@@ -573,7 +574,6 @@ def _with_motion_of_ground(
         return job
     moving = read_moving(job.ground, armature, ground, schedule(job).frames)
     return replace(job, ground=moving)
->>>>>>> 1dc2e54 (Generate reads how its ground moves in a step of its own)
 
 
 def _write_back(*objects: bpy.types.Object | None) -> None:
