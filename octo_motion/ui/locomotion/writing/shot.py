@@ -536,11 +536,10 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         look = replace(job.body, look_at=read_look(settings, armature, frames))
         reaching = read_reaches(armature, settings, found, frames)
         job = replace(job, reaching=reaching, body=look)
-    job = _with_motion_of_ground(job, armature, settings.ground.object)
     return Shot(
         armature=armature.name,
         scene=scene.name,
-        job=job,
+        job=_with_motion_of_ground(job, armature, settings.ground.object),
         detection=found.detection,
         edits=edits,
         extend_scene_range=settings.extend_scene_range,
