@@ -9,7 +9,7 @@ armature = active if active.type == "ARMATURE" else active.find_armature()
 settings = armature.octo_motion.locomotion
 
 settings.gait = "tiptoe"
-settings.cycle_time = 1.4
+settings.cycle_time = 1.8
 settings.ground.duty = 0.6
 settings.ground.planted = 0.3
 settings.ground.lift = 0.05
