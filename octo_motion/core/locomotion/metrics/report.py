@@ -16,7 +16,16 @@ from typing import Final
 import numpy as np
 
 from ...phrases import joined_phrases, phrase
-from ...rotations import Floats, angle_between, conjugate, from_matrix, multiply, rotate
+from ...rotations import (
+    Floats,
+    angle_between,
+    conjugate,
+    continuous,
+    from_matrix,
+    multiply,
+    normalized,
+    rotate,
+)
 from ..clearance import DEEP, Separation
 from ..ground import Ground
 from ..rig import ArmFrames, ArmSkin, Poses, halfway_linear
@@ -184,8 +193,8 @@ class Measured:
     rate: float = 24.0
     """Frames per second."""
     stays: tuple[Floats, Floats] | None = None
-    """Location (3,) and orientation (4,) of an armature that plays in place; its poses are those
-    of one that goes along. None where it does."""
+    """Locations (frames, 3) and orientations (frames, 4) of an armature that plays in place; its
+    poses are those of one that goes along. None where it does."""
     played: Played | None = None
     """What Blender plays, none where that is what was computed."""
     floor: Ground | None = None
@@ -300,8 +309,9 @@ def _places(measured: Measured, *, going: bool) -> tuple[Floats, Floats]:
     orientations = _joined(poses.orientations, half.orientations)
     if going or measured.stays is None:
         return locations, orientations
-    stays = measured.stays
-    return np.broadcast_to(stays[0], locations.shape), np.broadcast_to(stays[1], orientations.shape)
+    stayed, turned = measured.stays[0], continuous(measured.stays[1])
+    half_turned = normalized(turned[1:] + turned[:-1])
+    return _joined(stayed, 0.5 * (stayed[1:] + stayed[:-1])), _joined(turned, half_turned)
 
 
 def _half(measured: Measured) -> Poses:
@@ -402,9 +412,9 @@ def _going(measured: Measured, joints: Floats) -> Floats:
     """
     if measured.stays is None:
         return joints
-    location, orientation = measured.stays
+    location, orientation = _places(measured, going=False)
     locations, orientations = _places(measured, going=True)
-    own = rotate(conjugate(orientation), joints - location)
+    own = rotate(conjugate(orientation)[:, None], joints - location[:, None])
     return locations[:, None] + rotate(orientations[:, None], own)
 
 

@@ -171,7 +171,8 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     # The ground is as it was planned on.
     planned, along = posed.planned or (arms, posed.going)
     framed = along[0][::every], along[1][::every]
-    measured, overlaps = _measured(plan, planned.at(slice(None, None, every)), framed, keyed)
+    stays = keyed[0][::every], keyed[1][::every]
+    measured, overlaps = _measured(plan, planned.at(slice(None, None, every)), framed, stays)
     # A key at every moment, unless fewer say the same.
     channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.widths, *motion.stretch]
     if reducing:
@@ -646,7 +647,7 @@ def _measured(
         halfway=halfway_automatic(poses, cyclic=job.repeats),
         skins=below.skins if below is not None else None,
         rate=job.timing.rate,
-        stays=(keyed[0][0], keyed[1][0]) if job.in_place else None,
+        stays=keyed if job.in_place else None,
         floor=_floor_under(job, keyed, plan.first.poser.arm_length * creature.scale),
     )
     return measured, overlaps

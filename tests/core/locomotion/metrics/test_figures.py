@@ -213,7 +213,7 @@ def creeping(count: int = 25, step: float = 0.004) -> Measured:
         lying=[np.zeros((count, 3), dtype=bool)] * 2,
         cycles=np.zeros((count, 2), dtype=int),
         skins=[round_skin(0.1), round_skin(0.1)],
-        stays=(np.array([0.0, 0.0, 0.1]), IDENTITY),
+        stays=(np.tile([0.0, 0.0, 0.1], (count, 1)), np.tile(IDENTITY, (count, 1))),
     )
 
 
