@@ -52,7 +52,7 @@ def test_a_crawl_goes_its_way_whichever_way_it_faces(octopus: Any) -> None:
         assert np.abs(apart).max() < 0.02  # m, on a way of 4 m
 
 
-def test_arms_that_push_get_longer_and_lead_away_from_the_goal(octopus: Any) -> None:
+def test_arms_that_hold_on_get_longer_before_they_let_go(octopus: Any) -> None:
     bpy.ops.octo_motion.setup_load(name="crawl")
     bpy.ops.octo_motion.add_route(**STRAIGHT)
     bpy.context.view_layer.objects.active = octopus
@@ -73,7 +73,7 @@ def test_arms_that_push_get_longer_and_lead_away_from_the_goal(octopus: Any) -> 
                 span = strains[first + 1 : last]
                 lowest = int(span.argmin())
                 longer.append(span[lowest:].max() - span.min())
-    # It shortens after it has taken hold, and is long again before it lets go.
+    # From where it is shortest in its hold to where it is longest after that.
     assert len(longer) > 10
     assert np.median(longer) > 0.02
 

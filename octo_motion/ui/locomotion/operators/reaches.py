@@ -222,6 +222,18 @@ class OCTO_MOTION_UL_changes(ItemRows, bpy.types.UIList):
         row.prop(item, "position", text="", emboss=False)
 
 
+def position_on_route() -> Any:
+    """The property of operators that says at which place of a route."""
+    return FloatProperty(
+        name="Position",
+        description="Where along the route: 0 at its start, 1 at its end",
+        subtype="FACTOR",
+        default=0.5,
+        min=0.0,
+        max=1.0,
+    )
+
+
 class OCTO_MOTION_OT_change_add(ListOperator, bpy.types.Operator):
     bl_idname = "octo_motion.change_add"
     bl_label = "Add Change of Gait"
@@ -235,14 +247,7 @@ class OCTO_MOTION_OT_change_add(ListOperator, bpy.types.Operator):
         default="swim",
         search=lambda _operator, _context, _text: gait_names(),
     )
-    position: FloatProperty(
-        name="Position",
-        description="Where along the route: 0 at its start, 1 at its end",
-        subtype="FACTOR",
-        default=0.5,
-        min=0.0,
-        max=1.0,
-    )
+    position: position_on_route()
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         load_gait(self.gait)
@@ -327,14 +332,7 @@ class OCTO_MOTION_OT_along_add(ListOperator, bpy.types.Operator):
         description="What has a value there",
         items=SETTINGS_ALONG,
     )
-    position: FloatProperty(
-        name="Position",
-        description="Where along the route: 0 at its start, 1 at its end",
-        subtype="FACTOR",
-        default=0.5,
-        min=0.0,
-        max=1.0,
-    )
+    position: position_on_route()
 
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         same = [each for each in settings.along if each.setting == self.setting]
