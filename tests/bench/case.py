@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Collection
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -135,18 +136,21 @@ def _places() -> dict[str, list[Place]]:
     from octo_motion.blender.animation import actions
     from octo_motion.core.locomotion.gait import gait_poser as generator
     from octo_motion.core.locomotion.ground import walk
-    from octo_motion.ui.locomotion.writing import shot as workflow
+    from octo_motion.ui.locomotion.operators import generate
 
     # A module of the same name as the function that its package hands out.
     computing = importlib.import_module("octo_motion.core.locomotion.motion.pipeline")
+    planning = importlib.import_module("octo_motion.core.locomotion.motion.planning")
     return {
-        "read rig, route, settings": [(workflow, "prepare")],
+        "read rig, route, settings": [(generate, "prepare")],
         "plan: gaits, footholds": [(computing, "plan_motion")],
         "travel along the route": [(computing, "plan_travel"), (computing, "object_transforms")],
         "gait angles and targets": [(generator.GaitPoser, "pose"), (generator, "pseudo_targets")],
         "solve (CCD)": [(generator, "solve_ccd"), (generator, "asked_shape")],
         "joints to bone rotations": [(generator, "rotate_bones")],
-        "lay down what holds on": [(walk.GroundedWalk, "pose")],
+        "lay down what holds on": [(walk.GroundedWalk, "posing")],
+        "let turns take their time": [(computing, "_take_time")],
+        "body, mantle, siphon, eyes": [(planning, "_self_motion"), (computing, "_organs")],
         "off the ground between frames": [(computing, "_cleared")],
         "keep arms apart": [(computing, "_separate")],
         "measure the figures": [(computing, "_measured"), (computing, "figures")],
@@ -155,6 +159,11 @@ def _places() -> dict[str, list[Place]]:
         "write keys": [(actions, "_write_curves")],
         "fingerprint of the keys": [(actions, "_keys_digest"), (actions, "_fingerprint")],
     }
+
+
+def labels() -> Collection[str]:
+    """What the time of a run is spent on, but for all else."""
+    return _places()
 
 
 def peak_megabytes() -> float:

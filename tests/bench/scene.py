@@ -97,6 +97,8 @@ def set_for_comparison(settings: Any) -> None:
     settings.turning = 0.0
     settings.variation_min = settings.variation_max = 0.0
     settings.breathing = 0.0
+    for name in ("surge", "mantle", "siphon", "eyes", "head"):
+        setattr(settings.body, name, 0.0)
 
 
 def _octopus(arms: int, joints: int, gait: str, *, skin: bool) -> bpy.types.Object:

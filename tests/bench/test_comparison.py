@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.bench import comparison
+from tests.bench import case, comparison
 from tests.bench.case import Case, run
 from tests.bench.pages import FIGURES
 
@@ -42,6 +42,12 @@ def test_a_walk_that_does_more_does_not_meet_them_and_gets_no_ratio(
     shown = run(Case("generate", comparison.CONTRACT_FRAMES)).quality
     assert shown is not None
     assert "No ratio" in comparison.refusal({"generate": shown.largest_error})
+
+
+def test_where_the_time_goes_names_what_is_called_today() -> None:
+    frames = 2 * comparison.CONTRACT_FRAMES
+    spent = [run(Case(way, frames, look=False)).parts for way in ("default", "generate")]
+    assert set(case.labels()) - set().union(*spent) == {"handles, few keys"}
 
 
 def test_the_bench_stops_where_ways_do_not_meet_the_same_targets(

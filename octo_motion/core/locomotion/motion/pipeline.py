@@ -632,6 +632,10 @@ def _measured(
         return None, overlaps
     poses = Poses(arms.rotations, arms.strains, *going)
     below = plan.standing[0].job if plan.standing else job.floor
+    ground = _ground(plan)
+    floor = _floor_under(job, keyed, plan.first.poser.arm_length * creature.scale)
+    # Between frames it matters what is below.
+    nowhere = ground is None and floor is None
     measured = Measured(
         frames=plan.schedule.frames,
         arms=frames_of_arms(creature.skeleton, creature.arms, creature.body),
@@ -639,16 +643,16 @@ def _measured(
         poses=poses,
         misses=np.maximum(arms.late, arms.misses),
         scale=creature.scale,
-        ground=_ground(plan),
+        ground=ground,
         lying=arms.in_contact,
         cycles=arms.cycles,
         separation=separation,
         every=every,
-        halfway=halfway_automatic(poses, cyclic=job.repeats),
+        halfway=None if nowhere else halfway_automatic(poses, cyclic=job.repeats),
         skins=below.skins if below is not None else None,
         rate=job.timing.rate,
         stays=keyed if job.in_place else None,
-        floor=_floor_under(job, keyed, plan.first.poser.arm_length * creature.scale),
+        floor=floor,
     )
     return measured, overlaps
 
@@ -658,6 +662,8 @@ def _organs(
 ) -> OrganPoses:
     """What the body does by itself at frames (moments,), which need not be whole."""
     job, creature = plan.job, plan.job.creature
+    if plan.self_motion is None:
+        return OrganPoses((), np.zeros((len(frames), 0, 4)), {})
     schedule, held = plan.schedule, np.tile(plan.mantle_rotations, (len(frames), 1, 1))
     if swimming is not None:
         rest = np.broadcast_to(IDENTITY, held.shape)

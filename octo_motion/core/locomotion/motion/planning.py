@@ -57,7 +57,7 @@ from ..rig import (
     stretch_mantle,
 )
 from .carrying import Carry
-from .job import ChangesByHeight, GaitJob, MotionJob, ShownContact, Timing, Tolerances
+from .job import BodyJob, ChangesByHeight, GaitJob, MotionJob, ShownContact, Timing, Tolerances
 from .segments import Gait, Segments, Standing, Transitions, stand
 
 _posers: Final[ContentCache[GaitPoser]] = ContentCache(12)
@@ -188,8 +188,8 @@ class MotionPlan:
     """Bones that are stretched out, none in a walk."""
     mantle_rotations: Floats
     """(bones, 4) how, the same at every frame."""
-    self_motion: SelfMotion
-    """What the body does by itself."""
+    self_motion: SelfMotion | None
+    """What the body does by itself, none for nothing."""
     surge: Surge | None
     """How far the body is from its place, as its arms push it; none for nowhere."""
     warnings: tuple[str, ...]
@@ -323,7 +323,10 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         pace=pace,
         mantle=mantle,
         mantle_rotations=stretch_mantle(creature.skeleton, mantle, creature.body, job.streamline),
-        self_motion=_self_motion(job, when, segments, pushed),
+        # A mantle that is stretched out is one of the organs.
+        self_motion=_self_motion(job, when, segments, pushed)
+        if len(mantle) or _moves_by_itself(job.body)
+        else None,
         surge=pushed,
         warnings=tuple(warnings),
         carry=_along(job, carry, faces, standing),
@@ -528,6 +531,12 @@ def _timing(job: MotionJob, route: Route, travel: TravelSettings) -> tuple[float
         )
     steps = np.arange(count, dtype=np.float64)
     return exact / rate, start + steps, np.minimum(steps / exact, 1.0)
+
+
+def _moves_by_itself(body: BodyJob) -> bool:
+    """Whether any organ does anything."""
+    of = body.settings
+    return max(of.mantle, of.siphon, of.eyes, of.head, body.breathing.amount) > 0.0
 
 
 def _self_motion(
