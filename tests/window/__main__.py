@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Install the zip into an empty user folder, and let a Blender with a window live the first hour.
 
-    python -m tests.window ARCHIVE [STEPS] [--folder build/window]
+    python -m tests.window ARCHIVE [STEPS] [--language ja_JP] [--folder build/window]
 
 BLENDER names the Blender, options may follow it. Where there is none, or no display, that is said
-and nothing is tried. Each step leaves pictures and a line in report.json.
+and nothing is tried. Each step leaves pictures and a line in report.json; hour.png shows the
+pictures of all of them, in their order.
 """
 
 from __future__ import annotations
@@ -19,8 +20,14 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
 
 HERE = Path(__file__).resolve().parent
+CLIPS = HERE.parent.parent / "docs" / "examples" / "clips"
+COLUMNS = 4
 WINDOWS = platform.system() == "Windows"
 PATIENCE = 1800.0
 """Seconds: drawn by software, each picture takes one or more."""
@@ -31,6 +38,7 @@ def main(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(prog="make test-window", description=__doc__)
     parser.add_argument("archive", type=Path, help="the extension's zip")
     parser.add_argument("steps", nargs="*", help="of the first hour; all if none is named")
+    parser.add_argument("--language", default="en_US", help="that Blender speaks, such as ja_JP")
     parser.add_argument("--folder", type=Path, default=Path("build/window"))
     chosen = parser.parse_args(arguments)
     words = shlex.split(os.environ.get("BLENDER") or "blender", posix=not WINDOWS)
@@ -48,16 +56,42 @@ def main(arguments: Sequence[str]) -> int:
         check=True,
     )
     options = ("--enable-event-simulate", "--window-fullscreen")
+    given = (str(folder), chosen.language, str(CLIPS), *chosen.steps)
     with (folder / "said.txt").open("w", encoding="utf-8") as said:
         ended = subprocess.run(
-            [*words, *options, "--python", str(HERE / "hour.py"), "--", str(folder), *chosen.steps],
+            [*words, *options, "--python", str(HERE / "hour.py"), "--", *given],
             env=environment,
             stdout=said,
             stderr=subprocess.STDOUT,
             check=False,
             timeout=PATIENCE,
         )
+    join(sorted(folder.glob("*.png"), key=os.path.getmtime), folder / "hour.png")
     return told(folder, ended.returncode)
+
+
+def join(pictures: Sequence[Path], path: Path) -> None:
+    """One sheet of them all, four beside each other, at half their size."""
+    if not pictures:
+        return
+    small = []
+    for each in pictures:
+        image: Any = bpy.data.images.load(str(each))
+        width, height = image.size
+        pixels = np.empty(width * height * 4, dtype=np.float32)
+        image.pixels.foreach_get(pixels)
+        even = pixels.reshape(height, width, 4)[: height // 2 * 2, : width // 2 * 2]
+        small.append(even.reshape(height // 2, 2, width // 2, 2, 4).mean(axis=(1, 3)))
+    small += [np.ones_like(small[0])] * (-len(small) % COLUMNS)
+    rows = [
+        np.concatenate(small[at : at + COLUMNS], axis=1) for at in range(0, len(small), COLUMNS)
+    ]
+    # Blender's pictures begin at the bottom.
+    sheet = np.concatenate(rows[::-1], axis=0)
+    image = bpy.data.images.new("Hour", sheet.shape[1], sheet.shape[0])
+    image.pixels.foreach_set(sheet.ravel())
+    image.filepath_raw, image.file_format = str(path), "PNG"
+    image.save()
 
 
 def no_window(blender: str) -> str:

@@ -85,19 +85,20 @@ class Hand:
         yield from self.settled()
 
     def type(self, text: str) -> Steps:
-        """Type words."""
+        """Type words; a letter that has no key of its own comes as an input method sends it."""
         for each in text:
-            name = _KEYS.get(each) or (_DIGITS[int(each)] if each.isdigit() else each.upper())
+            name = _KEYS.get(each) or (_DIGITS[int(each)] if each in "0123456789" else each.upper())
+            name = name if each.isascii() else "A"
             self.event(name, "PRESS", unicode=each, shift=each.isupper())
             self.event(name, "RELEASE")
             yield PAUSE
 
     def search(self, words: str) -> Steps:
-        """Call what the menu search finds first for words."""
+        """Call what the menu search finds first for words, said in the language that is shown."""
         yield from self.over()
         yield from self.key("F3")
         yield 0.5
-        yield from self.type(words)
+        yield from self.type(bpy.app.translations.pgettext_iface(words, "Operator"))
         yield 1.0
         yield from self.key("RET")
         yield 0.3

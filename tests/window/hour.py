@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The first hour, step by step; Blender runs this, see ``__main__.py``.
 
-blender --enable-event-simulate --python tests/window/hour.py -- FOLDER [STEPS]
+blender --enable-event-simulate --python tests/window/hour.py -- FOLDER LANGUAGE CLIPS [STEPS]
 """
 
 from __future__ import annotations
@@ -95,6 +95,33 @@ def first_walk(hand: Hand, figures: Figures) -> Steps:
     for _ in range(2):
         yield from hand.key("Z", ctrl=True, shift=True)
     yield from hand.until(lambda: action_of(octopus()) is not None, "Redo of the walk")
+
+
+def setup_by_picture(hand: Hand, figures: Figures) -> Steps:
+    """The picture is clicked, and one of those that it shows."""
+    select(octopus())
+    before = action_of(octopus()).frame_range[1]
+    chosen = bpy.context.window_manager.octo_motion_setup
+    region = hand.region("UI")
+    clicks = hand.clicks
+    yield from hand.find("octo_motion.generate_locomotion")
+    generate = hand._place
+    yield from hand.move(region.x + region.width // 2, generate[1] + 75)
+    yield from hand.click()
+    yield 1.0
+    yield from hand.take("setup_1_pictures")
+    x, y = hand._place
+    yield from hand.move(x, y - 140)
+    yield from hand.click()
+    yield 1.0
+    after = bpy.context.window_manager.octo_motion_setup
+    check(after != chosen, "The click on a picture has chosen nothing.")
+    yield from hand.move(*generate)
+    yield from hand.click()
+    yield from hand.until(lambda: action_of(octopus()).frame_range[1] != before, "Another motion")
+    bpy.context.scene.frame_set(40)
+    yield from hand.take("setup_2_generated")
+    figures |= {"from": chosen, "to": after, "clicks": hand.clicks - clicks}
 
 
 def live_drag(hand: Hand, figures: Figures) -> Steps:
@@ -222,6 +249,35 @@ def splice(hand: Hand, figures: Figures) -> Steps:
     )
 
 
+def drop(hand: Hand, figures: Figures) -> Steps:
+    """Two clips are let fall into the viewport, and a part of one is put onto the other."""
+    new_file(hand)
+    yield 1.0
+    yield from hand.show_tab()
+    files = [{"name": name} for name in ("walk.bvh", "throw.bvh")]
+    clips = sys.argv[sys.argv.index("--") + 3]
+    # No event tells of files from outside: this is what Blender calls once they are let go.
+    with bpy.context.temp_override(window=hand.window, area=hand.area(), region=hand.region()):
+        bpy.ops.octo_motion.import_clips("INVOKE_DEFAULT", directory=clips, files=files)
+    yield from hand.until(lambda: len(bpy.data.armatures) == 2, "Both clips")
+    yield 2.0
+    people = [each for each in bpy.data.objects if each.type == "ARMATURE"]
+    yield from hand.take("drop_1_imported")
+    walker = next(each for each in people if "walk" in each.name.lower())
+    (thrower,) = (each for each in people if each is not walker)
+    select(thrower)
+    walker.select_set(state=True)
+    bpy.context.view_layer.objects.active = walker
+    begun, hand.clicks = time.perf_counter(), 0
+    yield from hand.search("Add Splice")
+    stack = walker.octo_motion.splicing
+    yield from hand.until(lambda: len(stack.splices) == 1, "The splice")
+    yield from hand.press("octo_motion.splice_build")
+    yield from hand.until(lambda: stack.result is not None, "The spliced action")
+    yield from hand.take("drop_2_built")
+    figures |= {"clicks": hand.clicks, "seconds": round(time.perf_counter() - begun, 1)}
+
+
 def pose(hand: Hand, figures: Figures) -> Steps:
     """An arm is pinned, pulled, keyed; undo; and Blender asks before it quits over the key."""
     new_file(hand)
@@ -269,6 +325,29 @@ def pose(hand: Hand, figures: Figures) -> Steps:
     yield 0.5
 
 
+def language(hand: Hand, figures: Figures) -> Steps:
+    """Blender speaks Japanese, and then again what it spoke; the panel follows at once."""
+    new_file(hand)
+    yield 1.0
+    yield from hand.show_tab()
+    bpy.ops.octo_motion.add_octopus("INVOKE_DEFAULT")
+    yield from hand.settled()
+    view: Any = bpy.context.preferences.view
+    spoken = view.language
+    other = "ja_JP" if spoken != "ja_JP" else "en_US"
+    told = bpy.app.translations.pgettext_iface
+    before = told("Generate", "Operator")
+    for chosen, name in ((other, "language_1_other"), (spoken, "language_2_back")):
+        speak(chosen)
+        hand.redraw()
+        yield 1.0
+        yield from hand.show_tab()
+        yield from hand.take(name)
+        now = told("Generate", "Operator")
+        check((now == before) == (chosen == spoken), f"{chosen}: the button says '{now}'.")
+        figures[chosen] = now
+
+
 def switched_off(hand: Hand, figures: Figures) -> Steps:
     """The add-on is disabled in the middle of a session, and enabled again."""
     if not bpy.data.armatures:
@@ -294,10 +373,13 @@ def switched_off(hand: Hand, figures: Figures) -> Steps:
 
 STEPS: Final[dict[str, Callable[[Hand, Figures], Steps]]] = {
     "first_walk": first_walk,
+    "setup": setup_by_picture,
     "live_drag": live_drag,
     "live_slider": live_slider,
     "splice": splice,
+    "drop": drop,
     "pose": pose,
+    "language": language,
     "switched_off": switched_off,
 }
 
@@ -319,6 +401,14 @@ def _timed_follow() -> list[float]:
 
     live._follow = timed
     return taken
+
+
+def speak(language: str) -> None:
+    """Let Blender speak a language: interface, tooltips and reports, not names of new data."""
+    view: Any = bpy.context.preferences.view
+    view.language = language
+    view.use_translate_interface = view.use_translate_tooltips = language != "en_US"
+    view.use_translate_reports, view.use_translate_new_dataname = language != "en_US", False
 
 
 def _modal(name: str) -> bool:
@@ -394,10 +484,11 @@ def person(name: str, aside: float, *, wave: bool) -> Any:
     return armature
 
 
-def main(folder: Path, names: list[str]) -> None:
+def main(folder: Path, language: str, names: list[str]) -> None:
     """Begin; Blender ends when all is over."""
     view: Any = bpy.context.preferences.view
     view.show_splash, view.smooth_view = False, 0
+    speak(language)
     hand = Hand(folder)
     report: list[Figures] = []
 
@@ -440,4 +531,4 @@ def main(folder: Path, names: list[str]) -> None:
 
 if __name__ == "__main__":
     begins = sys.argv.index("--") + 1
-    main(Path(sys.argv[begins]), sys.argv[begins + 1 :])
+    main(Path(sys.argv[begins]), sys.argv[begins + 1], sys.argv[begins + 3 :])

@@ -203,6 +203,16 @@ def test_names_below_the_pictures_outlive_what_blender_was_told() -> None:
     )
 
 
+def test_names_below_the_pictures_follow_the_language(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Blender as a Python module speaks English alone: tests/window sees it in Japanese.
+    said = {"Hurry": "急ぎ足"}
+    before = setups._offered(None, None)
+    monkeypatch.setattr(setups, "translated", lambda text: said.get(str(text), str(text)))
+    after = setups._offered(None, None)
+    assert [item[0] for item in after] == [item[0] for item in before]
+    assert {item[1] for item in after} - {item[1] for item in before} == {"急ぎ足"}
+
+
 def test_a_click_on_the_picture_of_a_damaged_set_up_leaves_all_as_it_was(
     settings: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

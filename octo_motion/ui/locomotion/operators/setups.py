@@ -23,6 +23,7 @@ from ....blender.rig import active_armature
 from ....core.errors import OctoMotionError, SettingsError
 from ....core.phrases import as_phrase, phrase
 from ...declared_settings import assign, plain
+from ...language import hinted, translated
 from ...operator_base import ARMATURE, ArmatureOperator, ArmaturePresetAdd, window_manager
 from ..settings import (
     DEFAULT_GAIT,
@@ -251,19 +252,23 @@ def draw_setups(layout: Any) -> None:
 
 _SHOWN: Final = "octo_motion_setup"
 """A property of the window manager: the armature's set-up, to see and to choose."""
-_items: dict[tuple[str, int, int], tuple[str, str, str, int, int]] = {}
+_items: dict[tuple[str, str, int, int], tuple[str, str, str, int, int]] = {}
 """Blender keeps no text of its own, and draws later: what it was told once has to stay."""
 
 
 def _offered(_manager: Any, _context: bpy.types.Context | None) -> Any:
-    return [_item(name, icon, number) for number, (name, icon) in enumerate(_icons())]
+    # What a function offers Blender shows as it is, in whatever language it speaks.
+    return [
+        _item(name, translated(shown_name(name)), icon, number)
+        for number, (name, icon) in enumerate(_icons())
+    ]
 
 
-def _item(*key: Any) -> tuple[str, str, str, int, int]:
+def _item(name: str, shown: str, icon: int, number: int) -> tuple[str, str, str, int, int]:
+    key = name, shown, icon, number
     if key not in _items:
-        name, icon, number = key
-        shown = shown_name(name)
-        _items[key] = name, shown, phrase("Move like this: {shown}", shown=shown), icon, number
+        told = hinted(phrase("Move like this: {shown}", shown=shown))
+        _items[key] = name, shown, told, icon, number
     return _items[key]
 
 
