@@ -63,6 +63,7 @@ class Liar(Driver):
         self._forces = deque([nothing] * (late_force + 1), late_force + 1)
         self._samples: deque[Sample] = deque(maxlen=late_pose + 1)
         self._dice = random.Random(3)  # noqa: S311 - to be drawn again
+        self._first: Vector | None = None
 
     def read(self) -> Sample:
         force, torque = self._forces[0]
@@ -88,6 +89,11 @@ class Liar(Driver):
                 return scale(true, -1.0)
             case "ten times as fast":
                 return scale(true, 10.0)
+            case "a tenth as fast":
+                return scale(true, 0.1)
+            case "one speed":
+                self._first = self._first or (0.3, 0.0, 0.2)
+                return self._first
             case "anything":
                 x, y, z = (self._dice.gauss(0.0, 1.0) for _ in range(3))
                 return (x, y, z)
@@ -111,11 +117,26 @@ def drawn(radius: float, often: float) -> Wish:
     return wish
 
 
-def leaping(seconds: float) -> tuple[Vector, Quaternion]:
-    """A hand that wants to be elsewhere from one moment to the next, twice a second."""
-    if seconds % 1.0 < 0.5:
-        return ZERO, IDENTITY
-    return (0.01, 0.0, 0.0), from_rotation_vector((0.0, 0.2, 0.0))
+def leaping(far: float) -> Wish:
+    """A hand that wants to be elsewhere (m) from one moment to the next, twice a second."""
+
+    def wish(seconds: float) -> tuple[Vector, Quaternion]:
+        if seconds % 1.0 < 0.5:
+            return ZERO, IDENTITY
+        return (far, 0.0, 0.0), from_rotation_vector((0.0, min(1.0, 20.0 * far), 0.0))
+
+    return wish
+
+
+def letting_go(far: float, slowly: float) -> Wish:
+    """A hand that pulls away (m) in so many seconds, and is back at once."""
+
+    def wish(seconds: float) -> tuple[Vector, Quaternion]:
+        share = min(1.0, seconds / slowly) if seconds < slowly + 0.2 else 0.0
+        turn = from_rotation_vector((0.0, 20.0 * min(far, 0.05) * share, 0.0))
+        return (far * share, 0.0, 0.0), turn
+
+    return wish
 
 
 def still(seconds: float) -> tuple[Vector, Quaternion]:
@@ -164,9 +185,58 @@ def test_so_it_is_for_light_and_heavy_loose_and_firm_hands(
     assert device.turn.most <= MOST
 
 
-@pytest.mark.parametrize("late", [3, 20])
-def test_so_it_is_for_a_hand_that_jerks(late: int) -> None:
-    device, _ = held(leaping, late_force=late)
+@pytest.mark.parametrize(
+    ("far", "late"), [(0.01, 3), (0.01, 20), (0.03, 10), (0.03, 20), (0.05, 10), (0.08, 20)]
+)
+def test_so_it_is_for_a_hand_that_leaps(far: float, late: int) -> None:
+    """Forces that grow fast are under way in numbers when the hand turns round: 3 cm gave 0.06 J.
+
+    Measured: 0.0096 J at 3 cm and 0.015 J at 8 cm, both 20 ms late.
+    """
+    device, _ = held(leaping(far), late_force=late)
+    assert device.push.most <= MOST
+    assert device.turn.most <= MOST
+
+
+def test_so_it_is_for_a_light_hand_that_pulls_slowly() -> None:
+    """Of a pull of 10 cm a small share is as much force as the device has: it gave 0.05 J."""
+    hand = Hand(wish=letting_go(0.1, 1.0), mass=0.05, stiffness=20.0, damping=0.5)
+    device, _ = held(hand, late_force=20)
+    assert device.push.most <= MOST
+
+
+JERK = 60.0
+"""m/s²: a hand that holds a grip on a desk gets no faster sooner."""
+LIES = ("", "none", "another way", "ten times as fast", "a tenth as fast", "one speed", "anything")
+
+
+def drawn_hand(seed: int) -> tuple[Hand, int, int, str]:
+    """A hand at random, what it does, by how much device and force are late, and the lie."""
+    dice = random.Random(seed)  # noqa: S311 - to be drawn again by its seed
+    far, often = 10.0 ** dice.uniform(-2.3, -1.1), 10.0 ** dice.uniform(-0.3, 0.6)
+    wish = dice.choice([leaping(far), letting_go(far, 1.0 / often), drawn(far, often)])
+    mass = 10.0 ** dice.uniform(-1.3, -0.4)
+    stiffness = mass * min(dice.uniform(10.0, 45.0) ** 2, JERK / far)
+    damping = dice.uniform(0.15, 0.8) * math.sqrt(mass * stiffness)
+    hand = Hand(
+        wish=wish,
+        mass=mass,
+        inertia=2e-4 * 10.0 ** dice.uniform(-0.3, 0.3),
+        stiffness=stiffness,
+        damping=damping,
+    )
+    late = dice.randint(0, 20)
+    pose = dice.randint(0, late)
+    return hand, pose, late - pose, dice.choice(LIES)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_so_it_is_for_any_hand_any_delay_and_any_lie(seed: int) -> None:
+    """Hands of 50 to 400 g that leap, let go or draw circles of up to 8 cm, tight or loose.
+
+    Of 120 such, the most was 0.0153 J.
+    """
+    device, _ = held(*drawn_hand(seed))
     assert device.push.most <= MOST
     assert device.turn.most <= MOST
 

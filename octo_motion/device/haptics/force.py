@@ -196,10 +196,10 @@ _LONGEST: Final = 16.0
 that this was so."""
 _CALMS: Final = 2.0
 """Times the device's own damping, that takes its place."""
-GROWS: Final = 0.05
-GROWS_TURNING: Final = 0.2
-"""s, at least, from no force to the most, and torque: of what grows faster, too much would be under
-way before anybody sees what it does. Fingers are heavier to push than to turn."""
+GROWS: Final = 25.0
+GROWS_TURNING: Final = 1.0
+"""N/s and N·m/s, at most: of what grows faster, too much would be under way before anybody sees
+what it does. Whatever a device can give, for hands are as heavy at a strong one."""
 
 
 class Delays:
@@ -220,10 +220,11 @@ class Delays:
     """
 
     def __init__(self, period: float, most: float, grows: float, damping: float) -> None:
-        """For a loop (s), the most force (N, or N·m), s in which it grows, the device's damping."""
+        """For a loop (s), the most force (N, or N·m), how it grows (N/s), the device's damping."""
         count = math.ceil(_DOUBTED / period) + 2
         self._period = period
-        self._growth = most * period / grows
+        self._most = most
+        self._growth = grows * period
         self._damping = _CALMS * damping
         self._energy = np.full(count, _KEPT)
         """J by delay, the longest first, at most what is kept."""
@@ -270,7 +271,8 @@ class Delays:
             self._share = min(wanted, self._share + self._period / self._patience)
             if self._share == 1.0:
                 self._patience = max(_BEGINS, self._patience - self._period)
-        wish, before = scale(force, self._share), self._allowed
+        # Of what the device can give, for of a hand far away a small share would be much.
+        wish, before = scale(clamp_length(force, self._most), self._share), self._allowed
         grown = subtract(wish, before)
         if dot(grown, before) >= 0.0:
             wish = add(before, clamp_length(grown, self._growth))
