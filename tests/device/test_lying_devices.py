@@ -234,7 +234,7 @@ def drawn_hand(seed: int) -> tuple[Hand, int, int, str]:
 def test_so_it_is_for_any_hand_any_delay_and_any_lie(seed: int) -> None:
     """Hands of 50 to 400 g that leap, let go or draw circles of up to 8 cm, tight or loose.
 
-    Of 120 such, the most was 0.0153 J.
+    Of 120 such, the most was 0.0178 J of pushing and 0.0170 of turning.
     """
     device, _ = held(*drawn_hand(seed))
     assert device.push.most <= MOST
