@@ -18,6 +18,9 @@ from ...blender.versions import ndof_sensitivities
 from ...core.errors import SettingsError, WriteError
 from ...core.phrases import phrase
 from ...core.posing.picking import nearest_body
+from ...core.posing.puppet import Pose, bodies_with, part_of
+from ...core.posing.session import HandSample
+from ...core.posing.solver import Coupling
 from ...core.rotations import IDENTITY, Floats, from_matrix, from_rotation_vector, multiply
 from ...device.calibration import NONE, Calibration
 from ...device.driver import Kind
@@ -34,7 +37,10 @@ from ...device.messages import (
     WorldMessage,
 )
 from ...device.messages import Settings as DeviceSettings
+from ...device.simulation import coupling_for
+from .aids import HeldByDevice
 from .controls import PoseControls
+from .properties import posing_settings
 from .puppet_session import PuppetSession
 
 _WIDTH: Final = 0.25
@@ -310,6 +316,7 @@ class DeviceHands(HandsBase):
             RigError: the armature is gone, changed or in edit mode.
         """
         core = self.session.core
+        self._mirror()
         self.mouse.tick(self.passed())
         buttons, core.buttons = core.buttons, []
         if settings != self._settings:
@@ -329,6 +336,34 @@ class DeviceHands(HandsBase):
             self._asked = None
             self.message = NOTHING_NEAR
         return buttons
+
+    def _mirror(self) -> None:
+        """Where that is wanted, let the other side do as devices do."""
+        session = self.session
+        wanted = posing_settings(session.puppet.armature()).mirror and session.core.shared
+        session.other_side.follow(
+            {
+                number: HeldByDevice(
+                    each.body,
+                    np.array(each.coupled_position),
+                    HandSample(np.array(each.position), np.array(each.orientation)),
+                    self._coupling(number, each.body),
+                )
+                for number, each in self.client.pointers.items()
+                if wanted and each.body in session.puppet.own
+            }
+        )
+
+    def _coupling(self, number: int, body: int) -> Coupling:
+        """Of the spring with which a device holds a body."""
+        figure, pose, space = self.session.figure, self.session.core.pose, self._spaces.get(number)
+        which = bodies_with(figure, body)
+        return coupling_for(
+            part_of(figure, body),
+            Pose(pose.positions[which], pose.orientations[which]),
+            self.client.devices.get(number),
+            space.scale if space else 1.0,
+        )
 
     def _fit(self, number: int, device: DeviceMessage) -> None:
         """Lay the room of a device anew, whose own is another one now."""

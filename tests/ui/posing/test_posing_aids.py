@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
+from itertools import count
 from typing import Any
 
 import bpy
@@ -11,9 +13,14 @@ import numpy as np
 import pytest
 
 from octo_motion.core.rotations import Floats
+from octo_motion.device import bridge_process
+from octo_motion.device.messages import Settings
+from octo_motion.device.simulation import Simulation
 from octo_motion.ui.posing.controls import PoseControls
+from octo_motion.ui.posing.device_hands import DeviceHands
 from octo_motion.ui.posing.overlay import overlay_lines
 from octo_motion.ui.posing.puppet_session import PuppetSession
+from tests.device.test_shared_session import hand_message, joined
 
 TICK = 1.0 / 60.0
 BONES = (
@@ -147,3 +154,39 @@ def test_aids_are_drawn_where_they_are_wanted(person: Any, session: PuppetSessio
     for lines, colours, _ in overlay_lines(controls, eye):
         assert np.isfinite(lines).all()
         assert lines.shape == (len(colours), 3)
+
+
+@pytest.fixture
+def _steady(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No clock lengthens the bridge's steps."""
+    monkeypatch.setattr(bridge_process, "Simulation", partial(Simulation, clock=lambda: 0.0))
+
+
+@pytest.mark.usefixtures("_steady")
+def test_what_a_device_pulls_on_one_side_happens_on_the_other(
+    person: Any, session: PuppetSession
+) -> None:
+    person.octo_motion.posing.mirror = True
+    client, bridge, _ = joined()
+    hands = DeviceHands(session, client, Settings(reach=0.2), partial(next, count(0.0, 0.016)))
+    hands.tick(Settings(reach=0.2))
+    bridge.turn(0.0)
+    body, before = session.body("hand.L"), tail(person, "hand.L")
+    start = np.array(person.matrix_world @ person.pose.bones["hand.L"].center) * session.unit
+    way = np.array(person.matrix_world.to_3x3()) @ (-0.1, -0.2, 0.4) * session.unit
+    for number in range(1, 481):  # so many steps of the bridge, of 2 ms
+        at = start + min(1.0, number / 320) * way
+        bridge._heard[0] = hand_message(2e-3 * number, int(number < 440), (at[0], at[1], at[2]))
+        bridge.turn(2e-3 * number)
+        if number % 8 == 0:
+            hands.tick(Settings(reach=0.2))
+        if number == 240:
+            assert client.pointers[0].body == body
+            assert len(session.core.world.grabs) == 1
+    left, right = tail(person, "hand.L"), tail(person, "hand.R")
+    assert np.linalg.norm(left - before) > 0.3
+    # It does so a few redraws later, and clay remembers its way: 14 mm of one of 460.
+    assert right * (-1.0, 1.0, 1.0) == pytest.approx(left, abs=0.03)
+    assert not hands.holding
+    assert not session.core.world.grabs
+    assert {"hand.L", "hand.R"} <= set(session.key())
