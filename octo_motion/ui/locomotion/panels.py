@@ -155,6 +155,8 @@ class OCTO_MOTION_PT_body(_Panel, bpy.types.Panel):
         for name in ("mantle", "siphon", "eyes", "head"):
             column.prop(body, name)
         layout.prop(body, "trail")
+        if settings.travel_on != "NONE":
+            layout.prop(body, "settle")
         row = layout.row()
         row.active = body.eyes > 0.0
         row.prop(body, "look_at")

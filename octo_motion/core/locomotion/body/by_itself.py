@@ -23,7 +23,15 @@ import numpy as np
 
 from ...errors import SettingsError
 from ...phrases import phrase
-from ...rotations import Floats, conjugate, normalized, rotate, rotation_vector_between
+from ...rotations import (
+    Floats,
+    conjugate,
+    from_axis_angle,
+    multiply,
+    normalized,
+    rotate,
+    rotation_vector_between,
+)
 from ...settings import check_settings, setting
 from ...smoothing import evened, least_jerk
 
@@ -67,6 +75,16 @@ class BodySettings:
         "The outer thirds of free arms trail in the water, swing and settle. What rests on the "
         "ground stays where it is. Generate takes longer",
         default=False,
+    )
+    settle: float = setting(
+        "Settle",
+        "Seconds after the last frame of the way in which the body breathes on, and its mantle "
+        "and arms that follow through settle. Not for a loop, nor before a pose it ends in",
+        default=0.0,
+        low=0.0,
+        soft_high=5.0,
+        step=10,
+        precision=1,
     )
 
     def __post_init__(self) -> None:
@@ -261,6 +279,54 @@ def _share(
     return share
 
 
+# --- Stops of a body that stalks ------------------------------------------------------------------
+
+_CROUCHES: Final = 0.3, 0.26
+"""Shares of a stop within which the body crouches, and rises again at its end."""
+_TURNS: Final = (0.1, 0.34), (0.42, 0.7), (0.76, 1.0)
+"""Shares of a stop within which it turns to one side, to the other, and ahead again; from each of
+these to the next it looks there and keeps still."""
+_SIDEWAYS: Final = 0.3, 0.45
+"""Radians that it looks to a side, at least and at most …"""
+_BODY_ABOUT: Final = 0.4
+"""… and share of it that the body turns."""
+
+
+@dataclass(frozen=True)
+class Stalking:
+    """What a body does while it stops that stalks: it crouches, and looks to both sides.
+
+    All of it hangs on how far a stop has come, and is nothing where it begins and ends.
+    """
+
+    amount: float
+    """1 for all of it."""
+    sinks: float
+    """Metres that it crouches by."""
+    seed: int
+    """Of which side it looks to first, and how far."""
+
+    def looks(self, stood: Floats) -> Floats:
+        """Radians (n,) to the left that it looks, where so many stops (n,) are over."""
+        number, part = np.divmod(stood, 1.0)
+        stop = number.astype(np.int64)
+        random = np.random.default_rng([self.seed, 4])
+        low, high = _SIDEWAYS
+        drawn = random.uniform(low, high, (int(stop.max(initial=0)) + 1, 2))
+        drawn *= random.choice([-1.0, 1.0], (len(drawn), 1)) * np.array([1.0, -1.0])
+        first, second = drawn[stop].T
+        there, over, back = (least_jerk((part - start) / (end - start)) for start, end in _TURNS)
+        return self.amount * (there * first + over * (second - first) - back * second)
+
+    def placed(self, places: tuple[Floats, Floats], stood: Floats) -> tuple[Floats, Floats]:
+        """Centres (n, 3) and orientations (n, 4) of a body that does so."""
+        part = np.mod(stood, 1.0)
+        down, up = _CROUCHES
+        low = self.amount * self.sinks * least_jerk(part / down) * least_jerk((1.0 - part) / up)
+        turn = from_axis_angle(_UPWARD, _BODY_ABOUT * self.looks(stood))
+        return places[0] - low[:, None] * _UPWARD, multiply(places[1], turn)
+
+
 # --- Where the body is at even steps of its time --------------------------------------------------
 
 _MOMENT: Final = 1.0 / 120.0
@@ -291,6 +357,8 @@ class BodyTrack:
     """(n,) how far it swims, 0…1."""
     cyclic: bool
     """Whether it is a loop: the last moment is the first again, but for the way between."""
+    looks: Floats | None = None
+    """(n,) radians to the left that it looks to as it stops on its way, none where it does not."""
 
     @property
     def step(self) -> float:
@@ -438,7 +506,7 @@ class SelfMotion:
     shut: Floats
     """(n, eyes)"""
     about: Floats
-    """(n,) radians to the left that a body at rest looks about by."""
+    """(n,) radians to the left that a body looks about by that rests, or stops on its way."""
     way: Floats
     """(n, 3) arm lengths per second: where it goes, without the hurry of each push, as the armature
     has it."""
@@ -566,7 +634,8 @@ def _looking_about(track: BodyTrack, seed: int) -> Floats:
     number = np.minimum(place.astype(np.int64), len(drawn) - 2)
     share = least_jerk((place - number - _HELD) / (1.0 - _HELD))
     still = _STANDING / (track.evened(track.speed[:, None], _HEADED)[:, 0] + _STANDING)
-    return still**2 * (drawn[number] + share * (drawn[number + 1] - drawn[number]))
+    about = still**2 * (drawn[number] + share * (drawn[number + 1] - drawn[number]))
+    return about if track.looks is None else about + track.looks
 
 
 def _blinking(track: BodyTrack, seed: int, eye: int) -> Floats:

@@ -306,7 +306,8 @@ class _Posing:
         if name in self._organs.eyes:
             return self._look(bone, posed)
         if name == self._organs.siphon:
-            return from_rotation_vector(self._against(posed))
+            # It stays where it is between the arms while the head looks about.
+            return from_rotation_vector(self._against(posed) - self._about())
         return from_rotation_vector(self._swing(self._organs.mantle.index(name), posed))
 
     def _swing(self, place: int, posed: Floats) -> Floats:
@@ -321,9 +322,13 @@ class _Posing:
             return whole
         if place:
             return (1.0 - _OF_HEAD) / (many - 1) * whole
-        about = self._settings.head * _HEAD_ABOUT * motion.at(motion.about, self._moments.times)
-        turned = motion.at(motion.steady, self._moments.times) + about[:, None] * self._up
-        return _OF_HEAD * whole + turned
+        return _OF_HEAD * whole + motion.at(motion.steady, self._moments.times) + self._about()
+
+    def _about(self) -> Floats:
+        """Rotation vectors (moments, 3) of a head that looks about; none is moved without one."""
+        motion, has_head = self._motion, len(self._organs.mantle) > 1
+        share = has_head * self._settings.head * _HEAD_ABOUT
+        return share * motion.at(motion.about, self._moments.times)[:, None] * self._up
 
     def _against(self, posed: Floats) -> Floats:
         """Rotation vectors (moments, 3) of the siphon."""

@@ -31,7 +31,7 @@ from ..clearance import (
 from ..gait import CYCLE
 from ..ground import Ground, sample_ground
 from ..metrics import TOLD, Figure, Measured, figures
-from ..path import Travel, bearings_of, plan_travel, travel_at
+from ..path import bearings_of, plan_travel, travel_at
 from ..reaching import Carried, Reached, Travelling
 from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
 from .carrying import Carry, carried
@@ -205,6 +205,8 @@ class _Posed:
     arms: ArmMotion
     going: Travelled
     """As the body goes …"""
+    own: Travelled
+    """… without what takes it into poses …"""
     keyed: Travelled
     """… and as it gets keys, which stays where it is in place."""
     swimming: Floats | None
@@ -239,6 +241,8 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     offset = None if plan.surge is None else plan.surge.at(travel.distance)
     if offset is not None:
         places = places[0] + offset, places[1]
+    if plan.stalking is not None:
+        places = plan.stalking.placed(places, travel.stood)
     creature, hands = job.creature, _handovers(plan, times)
     eased = places
     if hands and not job.in_place and plan.carry is None:
@@ -265,13 +269,14 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     planned = None
     if plan.carry is not None:
         planned, arms = (arms, going), arms.copy()
-        going = keyed = _carried(plan, plan.carry, arms, going, travel)
+        going = keyed = _carried(plan, plan.carry, arms, going, (travel.distance, times))
         reached = _reach(plan, arms, keyed, going)
         eased = _body_of(creature, going)
         eased = eased_places(hands, creature.body, creature.scale, eased)
+    own = going
     if hands and not job.in_place:
         keyed = going = object_transforms(creature.body, creature.scale, *eased)
-    return _Posed(arms, going, keyed, swimming, reached, warnings, hands, planned)
+    return _Posed(arms, going, own, keyed, swimming, reached, warnings, hands, planned)
 
 
 def _body_of(creature: Creature, going: Travelled) -> Travelled:
@@ -308,9 +313,15 @@ def _hand_over(plan: MotionPlan, posed: _Posed) -> None:
 
 
 def _carried(
-    plan: MotionPlan, carry: Carry, arms: ArmMotion, going: Travelled, travel: Travel
+    plan: MotionPlan,
+    carry: Carry,
+    arms: ArmMotion,
+    going: Travelled,
+    come: tuple[Floats, Floats],
 ) -> Travelled:
-    """Where the armature is in the world; arms are taken there in place."""
+    """Where the armature is in the world that has come so far (moments,) at times (moments,); arms
+    are taken there in place.
+    """
     job, creature = plan.job, plan.job.creature
     assert job.ground is not None
     return carried(
@@ -318,8 +329,8 @@ def _carried(
         frames_of_arms(creature.skeleton, creature.arms, creature.body),
         arms,
         going,
-        travel.distance,
-        np.interp(travel.times, plan.schedule.times, plan.schedule.frames),
+        come[0],
+        np.interp(come[1], plan.schedule.times, plan.schedule.frames),
         body=creature.body,
         scale=creature.scale,
         may_stretch=job.ground.may_stretch,
@@ -600,7 +611,11 @@ def _trail(plan: MotionPlan, trailing: Trailing, posed: _Posed) -> Steps[None]:
         lying.any(axis=1) | (own > 0.0) for lying, own in zip(arms.in_contact, away.T, strict=True)
     ]
     rate, cyclic = plan.stride * job.timing.rate, job.in_place
-    found = trailed(trailing, creature, arms.rotations, posed.going, held, rate=rate, cyclic=cyclic)
+    # Arms follow the motion, and poses take over from it: what brings a body into a pose within a
+    # second would sweep them away.
+    share = np.prod([np.ones(len(posed.own[0])), *(each.share for each in posed.hands)], axis=0)
+    following = trailing, creature, arms.rotations, posed.own, held
+    found = trailed(*following, share=share, rate=rate, cyclic=cyclic)
     arms.rotations, free = yield from found
     if ground is not None:
         frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)

@@ -16,7 +16,7 @@ from ...errors import SettingsError
 from ...phrases import phrase
 from ...rotations import Floats, multiply, normalized, rotate
 from ...skeleton import Skeleton
-from ..body import BodyTrack, Holds, SelfMotion, Surge, self_motion, steps_of, surge
+from ..body import BodyTrack, Holds, SelfMotion, Stalking, Surge, self_motion, steps_of, surge
 from ..gait import CYCLE, Arm, GaitPoser, target_places
 from ..ground import (
     Carpet,
@@ -168,7 +168,7 @@ class Schedule:
     frames: Floats
     """(frames,) whole numbers."""
     times: Floats
-    """(frames,) share of the journey's time, 0…1."""
+    """(frames,) share of the journey's time: 0…1, and more while the body settles after it."""
     seconds: float
     head: tuple[str, ...]
     """Bones of the mantle, root to tip."""
@@ -192,6 +192,8 @@ class MotionPlan:
     """What the body does by itself, none for nothing."""
     surge: Surge | None
     """How far the body is from its place, as its arms push it; none for nowhere."""
+    stalking: Stalking | None
+    """What it does as it stops on its way; none where it never stops."""
     warnings: tuple[str, ...]
     carry: Carry | None = None
     """What takes the motion from the plan to the world; none where they are the same."""
@@ -315,6 +317,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     # A mantle that lies flat is swum along as it is.
     mantle = when.head if swims and job.streamline > 0.0 and not lean else ()
     creature, pushed = job.creature, _surge(job, segments, route)
+    stalking = _stalking(job, when, segments)
     yield 0.9
     plan = MotionPlan(
         job=job,
@@ -324,10 +327,11 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         mantle=mantle,
         mantle_rotations=stretch_mantle(creature.skeleton, mantle, creature.body, job.streamline),
         # A mantle that is stretched out is one of the organs.
-        self_motion=_self_motion(job, when, segments, pushed)
+        self_motion=_self_motion(job, when, segments, pushed, stalking)
         if len(mantle) or _moves_by_itself(job.body)
         else None,
         surge=pushed,
+        stalking=stalking,
         warnings=tuple(warnings),
         carry=_along(job, carry, faces, standing),
     )
@@ -513,7 +517,8 @@ def _timing(job: MotionJob, route: Route, travel: TravelSettings) -> tuple[float
         )
     # The motion is the same at any frame rate: it ends when it ends, and the frame after that
     # holds the end. A length that is whole but for rounding does not need that frame.
-    count = max(math.ceil(exact - 1e-4), 1) + 1
+    settling = 0.0 if job.in_place or job.end is not None else job.body.settings.settle * rate
+    count = max(math.ceil(exact + settling - 1e-4), 1) + 1
     if start < -LAST_FRAME:
         raise SettingsError(
             phrase(
@@ -530,7 +535,7 @@ def _timing(job: MotionJob, route: Route, travel: TravelSettings) -> tuple[float
             "Let it start earlier.",
         )
     steps = np.arange(count, dtype=np.float64)
-    return exact / rate, start + steps, np.minimum(steps / exact, 1.0)
+    return exact / rate, start + steps, np.minimum(steps, exact + settling) / exact
 
 
 def _moves_by_itself(body: BodyJob) -> bool:
@@ -540,16 +545,22 @@ def _moves_by_itself(body: BodyJob) -> bool:
 
 
 def _self_motion(
-    job: MotionJob, when: Schedule, segments: Segments, pushed: Surge | None
+    job: MotionJob,
+    when: Schedule,
+    segments: Segments,
+    pushed: Surge | None,
+    stalking: Stalking | None,
 ) -> SelfMotion:
     """What the body does by itself, at even steps of its time."""
     creature, first, body = job.creature, segments.gaits[0], job.body
-    times = steps_of(when.seconds)
+    times = steps_of(when.seconds * float(when.times[-1]))
     bearings = first.standing.bearings if first.standing is not None else None
-    travel = plan_travel(when.route, when.travel, times / times[-1], bearings)
+    travel = plan_travel(when.route, when.travel, times / when.seconds, bearings)
     places, turns = segments.places(travel)
     if pushed is not None:
         places = places + pushed.at(travel.distance)
+    if stalking is not None:
+        places, turns = stalking.placed((places, turns), travel.stood)
     swims = segments.swimming(travel.distance)
     if swims is None:
         swims = np.full(len(times), 0.0 if first.table.on_ground else 1.0)
@@ -560,6 +571,7 @@ def _self_motion(
         strokes=segments.strokes(travel),
         swimming=swims,
         cyclic=job.in_place,
+        looks=None if stalking is None else stalking.looks(travel.stood),
     )
     return self_motion(
         track,
@@ -569,6 +581,22 @@ def _self_motion(
         seed=body.seed,
         eyes=len(body.organs.eyes),
     )
+
+
+_CROUCHED: Final = 0.05
+"""Arm lengths by which a body that stalks crouches at its stops …"""
+_ABOVE: Final = 0.5
+"""… and of its height over what its skin would touch at most."""
+
+
+def _stalking(job: MotionJob, when: Schedule, segments: Segments) -> Stalking | None:
+    """What the body does as it stops on its way."""
+    paced, standing = paced_time(when.route, when.travel), segments.gaits[0].standing
+    if paced is None or paced.stops is None or standing is None:
+        return None
+    room = float(standing.line.clearances.min()) - standing.under
+    sinks = min(_CROUCHED * _arm_length(job) * job.creature.scale, _ABOVE * max(room, 0.0))
+    return Stalking(paced.stops.amount, sinks, job.body.seed)
 
 
 def _surge(job: MotionJob, segments: Segments, route: Route) -> Surge | None:

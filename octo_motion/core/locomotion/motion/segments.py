@@ -125,6 +125,11 @@ class Standing:
         """For each arm (bones + 1,) armature units from each joint to the skin below it."""
         return [each.radii for each in self.job.skins]
 
+    @property
+    def under(self) -> float:
+        """Metres that a body's skin reaches below its centre where its arms begin."""
+        return _under(self.poser, self.radii) * self.creature.scale
+
     def place(self, travel: Travel) -> tuple[Floats, Floats]:
         """World positions (frames, 3) and orientations (frames, 4) of the canonical body."""
         centres, upright = self.line.ride(travel.positions, travel.distance)

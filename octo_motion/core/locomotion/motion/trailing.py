@@ -39,6 +39,7 @@ def trailed(
     going: tuple[Floats, Floats],
     held: Sequence[np.ndarray],
     *,
+    share: Floats,
     rate: float,
     cyclic: bool,
 ) -> Generator[float, None, tuple[Floats, Floats]]:
@@ -50,6 +51,7 @@ def trailed(
         rotations: (moments, bones, 4) of all arms, one after the other.
         going: locations (moments, 3) and orientations (moments, 4) of the armature, world.
         held: (moments,) of each arm, when it is not to be moved.
+        share: (moments,) how far arms may follow at all, 0…1.
         rate: moments in a second.
         cyclic: whether the last moment is the first again, but for the way between.
 
@@ -70,14 +72,14 @@ def trailed(
     job = FollowJob(limbs, trailing.figure, motion, _SOFT, cycle=cycle)
     found = yield from follow(job)
     own = own_rotations(skeleton, limbs, motion, turns, found)
-    free = np.stack([_free(each, rate, cyclic=cyclic) for each in held], axis=1)
+    free = np.stack([share * _free(each, rate, cyclic=cyclic) for each in held], axis=1)
     result, place = rotations.copy(), {name: number for number, name in enumerate(names)}
     arm_of = [arm for arm, bones in enumerate(creature.bones) for _ in bones]
     for number, bone in enumerate(limbs.bones):
         column = place[skeleton.names[bone]]
-        share = free[:, arm_of[column]]
-        some = share > 0.0
-        result[some, column] = slerp(rotations[some, column], own[some, number], share[some])
+        here = free[:, arm_of[column]]
+        some = here > 0.0
+        result[some, column] = slerp(rotations[some, column], own[some, number], here[some])
     return result, free
 
 

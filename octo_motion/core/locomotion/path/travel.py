@@ -30,7 +30,7 @@ from ...rotations import (
 from ...settings import check_settings, setting, share_setting
 from ...smoothing import smooth_step
 from ..gait import CYCLE
-from .along_route import PacedTime, Stalking, ValuesAlong
+from .along_route import PacedTime, Stops, ValuesAlong
 from .route import Route
 
 _FEWEST: Final = 1024
@@ -420,7 +420,8 @@ class TravelSettings:
     """SWIM: phase of the middle of the power stroke. In the table β₁ falls from π/2 to π."""
     stalk: float = share_setting(
         "Stalk",
-        "Walking: go, stop in the middle of a step, look about, go on. 0 goes evenly",
+        "Walking: go, stop in the middle of a step, crouch, look about, go on. 1 comes to a "
+        "standstill, less creeps on meanwhile, 0 goes evenly",
         default=0.0,
     )
     look_ahead: float = setting(
@@ -501,6 +502,8 @@ class Travel:
     """(frames, 2) direction in the body's XY plane towards which travel will have turned a look
     ahead from here; its length is the angle, at most π. Zero where the route is straight. Of a body
     that swims as it lies, in the plane across its way."""
+    stood: Floats
+    """(frames,) stops of a body that stalks that are over, with the part of one that goes on."""
 
     def at(self, frames: np.ndarray) -> Travel:
         """The motion at some of the frames (n,)."""
@@ -533,9 +536,9 @@ def plan_travel(
         table: from ``bearings_of``, if it is there already.
     """
     at = np.clip(np.asarray(times, dtype=np.float64), 0.0, 1.0)
-    distance, phase = _progress(route, settings, at)
+    distance, phase, stood = _progress(route, settings, at)
     table = bearings_of(route, settings) if table is None else table
-    return replace(travel_at(route, settings, table, distance, phase), times=at)
+    return replace(travel_at(route, settings, table, distance, phase), times=at, stood=stood)
 
 
 def travel_at(
@@ -552,7 +555,8 @@ def travel_at(
     size = np.sqrt(turn[:, 0] * turn[:, 0] + turn[:, 1] * turn[:, 1])
     turn = turn * np.minimum(1.0, np.pi / np.maximum(size, np.pi))[:, None]
     positions = route.position(route.parameter_at(distance))
-    return Travel(distance / route.length, distance, phase, positions, rotations, turn)
+    stood = np.zeros_like(distance)
+    return Travel(distance / route.length, distance, phase, positions, rotations, turn, stood)
 
 
 def walked_at(
@@ -591,22 +595,32 @@ def duration(route: Route, settings: TravelSettings, metres_per_second: float) -
 
 
 _LEG: Final = 1.6
-"""Strides from stop to stop of a body that stalks …"""
-_HALT: Final = 0.1
-"""… and before and after a stop within which it slows down and gets going again."""
+"""Strides from stop to stop of a body that stalks; in time that it takes for a stride it …"""
+_HALT: Final = 0.14
+"""… comes to a standstill, and gets going again within as long, …"""
+_STAND: Final = 0.36
+"""… and stands so long."""
 _PACED: Final = 4096
 """Steps of the table of a pace that differs along the route."""
 
 
 def paced_time(route: Route, settings: TravelSettings) -> PacedTime | None:
-    """How a route is come through on which the pace differs; none where it does not."""
-    pace, stalk = settings.along.pace, settings.stalk if settings.manner == "WALK" else 0.0
-    if stalk > 0.0:
-        legs = max(round(route.length / (_LEG * settings.stride)), 1)
-        pace = Stalking(pace, legs, _HALT * settings.stride / route.length, stalk)
-    if pace is None:
+    """How a route is come through on which the pace differs or the body stops; none where it does
+    neither.
+    """
+    pace, stops = settings.along.pace, _stops(route, settings)
+    if pace is None and stops is None:
         return None
-    return PacedTime(pace, _share_of_way(route, settings, np.linspace(0, 1, _PACED)))
+    return PacedTime(pace, stops, _share_of_way(route, settings, np.linspace(0, 1, _PACED)))
+
+
+def _stops(route: Route, settings: TravelSettings) -> Stops | None:
+    """Where a body stops on its way, none where it never does."""
+    stride = settings.stride / route.length
+    legs = round(1.0 / (_LEG * stride))
+    if settings.manner != "WALK" or settings.stalk <= 0.0 or legs < 2:
+        return None
+    return Stops(legs, _HALT * stride, _STAND * stride, settings.stalk)
 
 
 def _share_of_way(route: Route, settings: TravelSettings, parameter: Floats) -> Floats:
@@ -652,11 +666,14 @@ def _last_phase(route: Route, settings: TravelSettings) -> float:
     return phase_at_distance(covered, settings.burst, settings.stroke_phase)
 
 
-def _progress(route: Route, settings: TravelSettings, times: Floats) -> tuple[Floats, Floats]:
-    """Distances and phases ``(frames,)``."""
+def _progress(
+    route: Route, settings: TravelSettings, times: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Distances, phases and stops that are over ``(frames,)``."""
     share = _eased(times, settings.ease_in, settings.ease_out) / _mean_speed(settings)
-    paced = paced_time(route, settings)
+    paced, stood = paced_time(route, settings), np.zeros_like(share)
     if paced is not None:
+        stood = stood if paced.stops is None else paced.stops.stood(share)
         share = paced.parameter(share)
     share = _share_of_way(route, settings, share)
     last = _last_phase(route, settings)
@@ -664,7 +681,7 @@ def _progress(route: Route, settings: TravelSettings, times: Floats) -> tuple[Fl
     if settings.manner == "SWIM":
         whole = stroke_distance(np.array([last]), settings.burst, settings.stroke_phase)
         share = stroke_distance(phase, settings.burst, settings.stroke_phase) / whole
-    return np.clip(share, 0.0, 1.0) * route.length, phase
+    return np.clip(share, 0.0, 1.0) * route.length, phase, stood
 
 
 def _mean_speed(settings: TravelSettings) -> float:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Low and slow, the arms close to the ground: it goes, stops, looks about, goes on.
+# Low and slow, the arms close to the ground: it goes, stops, crouches, looks about, goes on.
 import bpy
 
 active = bpy.context.object
@@ -14,4 +14,4 @@ settings.ground.planted = 0.3
 settings.ground.smoothing = 0.25
 settings.variation_min = -0.1
 settings.variation_max = 0.1
-settings.stalk = 0.9
+settings.stalk = 1.0

@@ -35,6 +35,7 @@ class OCTO_MOTION_PG_body(bpy.types.PropertyGroup):
     eyes: declared(BodySettings, "eyes")
     head: declared(BodySettings, "head")
     trail: declared(BodySettings, "trail")
+    settle: declared(BodySettings, "settle")
     look_at: props.PointerProperty(
         name="Look At",
         description="Object that the eyes look at; without one, they look where the body goes",
