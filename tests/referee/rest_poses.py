@@ -202,6 +202,22 @@ def hanging(joint: Joint, direction: Floats) -> Floats:
     return np.eye(3)
 
 
+def arms_lowered(degrees: float, elbows: float = 0.0) -> Callable[[Joint, Floats], Floats]:
+    """Arms that rest lower than the file has them, stretched along X, and are bent to the front."""
+
+    def rest_of(joint: Joint, direction: Floats) -> Floats:  # noqa: ARG001
+        name = joint.name.lower()
+        if not any(word in name for word in ("shldr", "arm", "elbow", "hand")):
+            return np.eye(3)
+        side = 1.0 if name.startswith("l") else -1.0
+        turn = about(2, np.array([-side * np.radians(degrees)]))[0]
+        if "shldr" not in name:
+            turn = turn @ about(1, np.array([-side * np.radians(elbows)]))[0]
+        return turn.T
+
+    return rest_of
+
+
 def anyhow(seed: int) -> Callable[[Joint, Floats], Floats]:
     """Each joint with a rotation of its own, without rhyme or reason."""
     generator = np.random.default_rng(seed)

@@ -7,6 +7,11 @@ Where both rest in the same pose, only axes differ, and that tells all. Else joi
 same bone tell how it lies in both files; and what they do not, the moments at which the limb lies
 alike in both clips: there its bones are turned alike. Bones that end a limb lie on what carries
 them as each clip alone says.
+
+Two rest poses that people stand in differ as limbs are lifted and bent, seldom as they are turned
+about themselves: a T, an A, arms that hang. So the one is laid over the other by the smallest turns
+from the body outwards, and believed where the motion does not speak against it: what is no pose
+does so at once.
 """
 
 from __future__ import annotations
@@ -19,6 +24,7 @@ import numpy as np
 
 from ...rotations import (
     Floats,
+    angle_between,
     conjugate,
     from_matrix,
     multiply,
@@ -44,6 +50,17 @@ _HALF: Final = 0.5
 """How much they say at most. What each clip alone tells of the elbow's plane is off the other way:
 over 190 pairs of clips with elbows that bend anyhow, half of each is off by 10° in the median,
 where either alone is by 16° and 31°."""
+
+_POSE: Final = np.radians(60.0)
+"""How far a pelvis or chest may lean, and a leg be turned about itself, against what the motion
+says where a rest pose is believed."""
+
+_ARM: Final = np.radians(110.0)
+"""Likewise of an arm, of which a motion says less: off by 60° in one pair of clips of ten whose
+elbows bend anyhow, and by 99° at most."""
+
+_OPPOSITE: Final = float(np.cos(np.radians(150.0)))
+"""Cosine of the angle between directions beyond which there is no smallest turn to speak of."""
 
 _FLAT: Final = 0.05
 """Of their length: joints that spread less than this sideways do not tell how a bone is turned."""
@@ -96,8 +113,13 @@ def agreeing(
     base, splice = (each.skeleton for each in clips)
     pairs = matched_bones(base, range(len(base)), splice, range(len(splice)), landmarks)
     same = _rest_in_one_pose(base, splice, pairs)
-    feet = {base.index.get(landmarks[0].get(f"foot.{side}") or "", -1) for side in "LR"}
-    ways = same if same is not None else _Ways(clips, pairs, found).all(feet)
+    if same is None:
+        marked = {name: base.index.get(bone, -1) for name, bone in landmarks[0].bones.items()}
+        finder = _Ways(clips, pairs, found)
+        told = finder.all({marked.get(f"foot.{side}", -1) for side in "LR"})
+        ways = finder.posed(told, marked)
+    else:
+        ways = same
     orientations = found[1].copy()
     for bone, way in ways.items():
         orientations[pairs[bone]] = multiply(found[0][bone], way)
@@ -141,6 +163,7 @@ class _Ways:
             for bone, answer in pairs.items()
         }
         self._ways: dict[int, Floats] = {}
+        self._anchored: set[int] = set()
 
     def all(self, feet: Collection[int]) -> dict[int, Floats]:
         """Of all bones on a body whose place joints tell. Feet that end a leg stand as before."""
@@ -149,6 +172,7 @@ class _Ways:
             told = self._by_joints(bone)
             if told is not None:
                 self._ways[bone], anchors[bone] = told, bone
+                self._anchored.add(bone)
                 continue
             parent = self._base.skeleton.parents[bone]
             if parent not in anchors:
@@ -160,6 +184,67 @@ class _Ways:
                 carrier = anchors[parent] if bone in feet else parent
                 self._ways[bone] = self._carried(bone, carrier)
         return self._ways
+
+    def posed(self, told: Mapping[int, Floats], marked: Mapping[str, int]) -> dict[int, Floats]:
+        """What was told of all bones, and of those whose rest poses are believed what these say.
+
+        Args:
+            told: by the motion.
+            marked: the base's bones by landmark.
+        """
+        rested = self._by_rest(told)
+        off = {bone: float(angle_between(told[bone], way)) for bone, way in rested.items()}
+
+        def believed(names: Collection[str], most: float) -> bool:
+            bones = [marked[name] for name in names if name in marked]
+            return all(off.get(bone, np.inf) < most for bone in bones)
+
+        if not believed([f"{each}.{side}" for each in ("thigh", "shin") for side in "LR"], _POSE):
+            return dict(told)
+        doubted = {
+            marked[f"upper_arm.{side}"]
+            for side in "LR"
+            if f"upper_arm.{side}" in marked
+            and not believed([f"{each}.{side}" for each in ("upper_arm", "forearm")], _ARM)
+        }
+        above = self._base.skeleton.ancestors
+        return dict(told) | {
+            bone: way for bone, way in rested.items() if doubted.isdisjoint((bone, *above(bone)))
+        }
+
+    def _by_rest(self, told: Mapping[int, Floats]) -> dict[int, Floats]:
+        """The splice's rest pose laid over the base's by the smallest turns; none of bones beneath
+        one that points the other way, or of a trunk that is bent too far.
+        """
+        base, splice = (each.skeleton.rest_rotations for each in (self._base, self._splice))
+        laid: dict[int, Floats] = {}
+        first = None
+        for bone in sorted(told):
+            other, parent = self._pairs[bone], self._base.skeleton.parents[bone]
+            if bone in self._anchored:
+                lay = multiply(multiply(base[bone], told[bone]), conjugate(splice[other]))
+                first = lay if first is None else first
+                if angle_between(first, lay) > _POSE:
+                    return {}
+            elif parent in laid:
+                lay = laid[parent]
+            else:
+                continue
+            if bone not in self._anchored and self._children[bone]:
+                ours, theirs = (normalized(each[0]) for each in self._joints(bone))
+                ours, theirs = (
+                    rotate(base[bone], ours),
+                    rotate(multiply(lay, splice[other]), theirs),
+                )
+                if ours @ theirs < _OPPOSITE:
+                    continue
+                lay = multiply(shortest_arc(theirs, ours), lay)
+            laid[bone] = lay
+        return {
+            bone: multiply(multiply(conjugate(base[bone]), lay), splice[self._pairs[bone]])
+            for bone, lay in laid.items()
+            if bone not in self._anchored
+        }
 
     def _carried(self, bone: int, carrier: int) -> Floats:
         """As it lies on what carries it in either reference pose."""
