@@ -275,9 +275,6 @@ def read_between(stack: Stack) -> Stack:
         # Where legs have led to stays so until the end.
         spans.append((start, np.inf if each.travel else end))
     moments = moments_within(base, spans, _finer(len(base)), STEP)
-    if any(each.travel and each.foot_lock for each in stack.acting):
-        # Feet are found to stand, and are held, from whole frame to whole frame.
-        moments = base.frames
     slot = _slot(settings.base, settings.base_slot)
     finer = base
     if len(moments) and is_recorded(armature, settings.base, slot):

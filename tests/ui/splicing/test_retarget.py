@@ -315,6 +315,29 @@ def test_feet_of_spliced_legs_that_travel_stand_too() -> None:
         assert (drifts(played(base), body) < 0.005) == locked
 
 
+def test_legs_that_travel_and_stand_are_right_between_frames_too() -> None:
+    """Half frames lie on the way through the whole frames, which is no straight one."""
+    source, hero = walker_and("short legs, wide hips")
+    body = BODIES["short legs, wide hips"]
+    base = make_body("Other", body)
+    walk(base, body)
+    bpy.data.objects.remove(hero)
+    select(source, base)
+    OPERATORS.splice_add(part="LEGS")
+    item = base.octo_motion.splicing.splices[0]
+    item.with_travel, item.ease_in, item.ease_out = True, 0, 0
+    OPERATORS.splice_build()
+    recording = played(base)
+    for bone in ("foot.L", "foot.R"):
+        place = joint(recording, bone) - joint(recording, "hips")
+        whole, half = place[::2], place[1::2]
+        way = (9.0 * (whole[1:-2] + whole[2:-1]) - whole[:-3] - whole[3:]) / 16.0
+        off = np.linalg.norm(half[1:-1] - way, axis=1) / body.leg
+        # Measured: 0.03 %, and 0.5 % where a foot takes hold; by keys on whole frames alone 0.15 %.
+        assert np.median(off) < 0.0007
+        assert off.max() < 0.01
+
+
 def test_location_keys_of_a_part_are_the_clips() -> None:
     """Not what the base left on the bones, which moved a hand off its arm."""
     source, base = walker_and("like it")

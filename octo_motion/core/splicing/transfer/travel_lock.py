@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from ...rotations import Floats, conjugate, rotate
+from ...rotations import Floats, conjugate, multiply, rotate, slerp
 from ..clip import Clip, SpliceWindow
 from .foot_contacts import (
     FootContacts,
@@ -29,6 +29,9 @@ SIGHT: Final = 2.0
 
 _GAP: Final = 1.5
 """Of the usual step between frames: more is a gap."""
+
+_DIGITS: Final = 6
+"""Of a frame's number that count."""
 
 _ANKLE: Final = 0.4
 """Leg lengths: an ankle higher above where its object stands does not stand there."""
@@ -75,12 +78,26 @@ class TravelLock:
     def onto(self, result: Clip, span: SpliceWindow) -> Clip:
         """The result of a splice with its feet held where the splice acts.
 
+        Whole frames are what they are without moments between them; those follow.
+        """
+        acting = np.arange(span.frames.start, span.frames.stop)
+        own = np.round(self._base.clip.frames, _DIGITS)
+        whole = np.isin(np.round(result.frames[acting], _DIGITS), own)
+        held = result
+        if whole.any():
+            held = self._held(result, acting[whole], span.taken(acting[whole]))
+        if whole.all():
+            return held
+        return _followed(held, self._held(result, acting, span), acting[whole], acting[~whole])
+
+    def _held(self, result: Clip, acting: np.ndarray, span: SpliceWindow) -> Clip:
+        """The same from row to row of those on which a splice acts, all others as they are.
+
         Of its frames some may be missing: what lies between gaps is looked at by itself.
         """
         last = len(self._frames) - 1
         places = np.interp(span.splice_frames, self._frames, np.arange(last + 1.0))
         rows = np.clip(np.round(places), 0, last).astype(np.intp)
-        acting = np.arange(span.frames.start, span.frames.stop)
         rotations, locations = result.rotations.copy(), result.locations.copy()
         steps = np.diff(result.frames[acting])
         gaps = np.flatnonzero(steps > _GAP * np.median(steps)) + 1 if len(steps) else []
@@ -97,6 +114,25 @@ class TravelLock:
             locked = lock_feet(self._base, result.taken(there), footing, span.weights[chosen])
             rotations[there], locations[there] = locked.rotations, locked.locations
         return replace(result, rotations=rotations, locations=locations)
+
+
+def _followed(goal: Clip, finer: Clip, done: np.ndarray, rest: np.ndarray) -> Clip:
+    """A clip that is right at some of its rows, and at the rest what a finer one is there, brought
+    along as that has to be at the rows beside them.
+    """
+    if not len(done):
+        return finer
+    places = np.interp(goal.frames[rest], goal.frames[done], np.arange(len(done)))
+    first = places.astype(np.intp)
+    after, share = np.minimum(first + 1, len(done) - 1), (places - first)[:, None]
+    off = goal.locations[done] - finer.locations[done]
+    locations, rotations = goal.locations.copy(), goal.rotations.copy()
+    locations[rest] = (
+        finer.locations[rest] + off[first] + share[..., None] * (off[after] - off[first])
+    )
+    turned = multiply(conjugate(finer.rotations[done]), goal.rotations[done])
+    rotations[rest] = multiply(finer.rotations[rest], slerp(turned[first], turned[after], share))
+    return replace(goal, rotations=rotations, locations=locations)
 
 
 def size_ratio(retarget: Retarget) -> float:
