@@ -407,6 +407,52 @@ Becken Oberschenkel_{}@thigh Unterschenkel_{}@shin Fuss_{}@foot Zehen_{}@toe
 """,
         *("L", "R"),
     ),
+    "rigify, deform bones": kind(
+        """
+- root@root DEF-spine@hips DEF-spine.001@s1 DEF-spine.002@s4 DEF-spine.003@chest
+  DEF-spine.004@neck DEF-spine.005@neck2 DEF-spine.006@head
+DEF-spine.003 DEF-shoulder.{}@clavicle DEF-upper_arm.{}@upper_arm
+  DEF-upper_arm.{}.001@upper_arm_middle DEF-forearm.{}@forearm
+  DEF-forearm.{}.001@forearm_middle DEF-hand.{}@hand DEF-f_index.01.{}@index0
+DEF-spine.003 DEF-breast.{}@bust
+DEF-spine DEF-pelvis.{}@hips
+DEF-spine DEF-thigh.{}@thigh DEF-thigh.{}.001@thigh_middle DEF-shin.{}@shin
+  DEF-shin.{}.001@shin_middle DEF-foot.{}@foot DEF-toe.{}@toe
+""",
+        *("L", "R"),
+    ),
+    "french": kind(
+        """
+- bassin@hips colonne@s1 poitrine@chest cou@neck tête@head
+poitrine clavicule_{}@clavicle bras_{}@upper_arm avant_bras_{}@forearm main_{}@hand
+bassin cuisse_{}@thigh jambe_{}@shin pied_{}@foot orteils_{}@toe
+""",
+        *("gauche", "droite"),
+    ),
+    "spanish": kind(
+        """
+- cadera@hips columna@s1 pecho@chest cuello@neck cabeza@head
+pecho clavicula_{}@clavicle brazo_{}@upper_arm antebrazo_{}@forearm mano_{}@hand
+cadera muslo_{}@thigh pierna_{}@shin pie_{}@foot
+""",
+        *("izq", "der"),
+    ),
+    "portuguese": kind(
+        """
+- quadril@hips coluna@s1 peito@chest pescoço@neck cabeça@head
+peito ombro_{}@clavicle braço_{}@upper_arm antebraço_{}@forearm mão_{}@hand
+quadril coxa_{}@thigh perna_{}@shin pé_{}@foot
+""",
+        *("esquerdo", "direito"),
+    ),
+    "italian": kind(
+        """
+- bacino@hips colonna@s1 torace@chest collo@neck testa@head
+torace clavicola_{}@clavicle braccio_{}@upper_arm avambraccio_{}@forearm mano_{}@hand
+bacino coscia_{}@thigh gamba_{}@shin piede_{}@foot
+""",
+        *("sx", "dx"),
+    ),
     "chinese": kind(
         """
 - 骨盆@hips 脊椎@s1 胸@chest 颈@neck 头@head

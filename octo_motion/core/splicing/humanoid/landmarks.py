@@ -61,31 +61,44 @@ class Landmarks:
 
 _WORDS: Final[dict[str, str]] = {
     "hips": "hips hip pelvis cog=.5 center=.6 torso=.5 センター=.7 腰=.9 腰部=.9 下半身=.8 骨盤 "
-    "ヒップ becken 髋=.9",
+    "ヒップ becken 髋=.9 "
+    "bassin bacino cadera quadril pelvi",
     "spine": "spine abdomen ab lowerback lowback lowerspine spinelower waist=.6 torso=.5 back=.5 "
-    "belly=.7 stomach=.7 lumbar 上半身 背骨 脊椎 脊柱 腹=.7 腹部=.7 胴=.5 体幹=.5",
+    "belly=.7 stomach=.7 lumbar 上半身 背骨 脊椎 脊柱 腹=.7 腹部=.7 胴=.5 体幹=.5 "
+    "colonne columna coluna colonna",
     "chest": "chest upperchest thorax thoracic=.8 ribcage torso=.6 spineupper upperspine brust "
-    "brustkorb 上半身=.5 胸 胸部 胸腔",
+    "brustkorb 上半身=.5 胸 胸部 胸腔 "
+    "poitrine torse=.7 pecho peito petto torace",
     "neck": "neck lowerneck necklower neckbase upperneck=.8 neckupper=.8 cervical=.7 hals "
-    "首 頸 頸部 颈 颈部 脖子",
-    "head": "head skull=.7 cranium=.7 kopf 頭 頭部 头 头部",
+    "首 頸 頸部 颈 颈部 脖子 "
+    "cou cuello pescoco collo",
+    "head": "head skull=.7 cranium=.7 kopf 頭 頭部 头 头部 tete cabeza cabeca testa",
     "clavicle": "clavicle collar collarbone clav shoulder=.7 shldr=.4 scapula=.5 "
-    "schulter=.7 schlüsselbein 肩 鎖骨 锁骨 肩膀=.7",
+    "schulter=.7 schlüsselbein 肩 鎖骨 锁骨 肩膀=.7 "
+    "clavicule clavicula clavicola epaule=.7 hombro=.7 ombro=.7 spalla=.7",
     "upper_arm": "upperarm uparm uarm armupper arm=.85 shldr=.8 shldrbend shoulder=.6 humerus "
-    "oberarm 腕 上腕 上腕部 肩関節 上臂 大臂",
+    "oberarm 腕 上腕 上腕部 肩関節 上臂 大臂 "
+    "bras brazo braco braccio",
     "forearm": "forearm armlower lowerarm lowarm loarm forearmbend elbow=.95 ulna=.8 radius=.8 "
-    "farm unterarm ひじ 肘 肘関節 前腕 前腕部 前臂 小臂 下臂 手肘",
-    "hand": "hand wrist palm=.5 carpals=.8 手首 手=.9 手関節 手のひら=.5 掌=.5 手腕 手掌=.9",
+    "farm unterarm ひじ 肘 肘関節 前腕 前腕部 前臂 小臂 下臂 手肘 "
+    "avantbras antebrazo antebraco avambraccio coude=.95 codo=.95 cotovelo=.95 gomito=.95",
+    "hand": "hand wrist palm=.5 carpals=.8 手首 手=.9 手関節 手のひら=.5 掌=.5 手腕 手掌=.9 "
+    "main=.9 mano mao poignet muneca pulso polso",
     "thigh": "thigh upleg legupper upperleg thighbend femur hip=.65 leg=.5 足=.9 脚=.9 もも 太もも "
-    "太腿 大腿 大腿部 股関節 oberschenkel",
+    "太腿 大腿 大腿部 股関節 oberschenkel "
+    "cuisse muslo coxa coscia",
     "shin": "shin calf leglower lowerleg lowleg loleg knee=.95 leg=.75 tibia shank "
-    "unterschenkel ひざ 膝 膝関節 すね 脛 下腿 下腿部 小腿 膝盖",
-    "foot": "foot ankle fuss fuß talus=.8 足首 足関節 足=.3 脚=.6 脚踝 脚腕",
+    "unterschenkel ひざ 膝 膝関節 すね 脛 下腿 下腿部 小腿 膝盖 "
+    "jambe pierna=.9 perna=.9 gamba=.9 tibia mollet genou=.95 rodilla=.95 joelho=.95 ginocchio=.95",
+    "foot": "foot ankle fuss fuß talus=.8 足首 足関節 足=.3 脚=.6 脚踝 脚腕 "
+    "pied pie pe=.7 piede cheville tobillo tornozelo caviglia",
     "toe": "toe toes toebase ball forefoot foot=.3 つま先 つまさき 爪先 足先=.8 zehen zeh "
-    "脚趾 脚掌=.8",
+    "脚趾 脚掌=.8 "
+    "orteil orteils dedos=.5 punta=.5",
 }
 """What each landmark is called, words of a name written together; with a weight where a word means
-it only in some rigs. English, German, Chinese; Japanese ones in whichever kana."""
+it only in some rigs. English, German, French, Spanish, Portuguese, Italian, Chinese, Japanese; in
+whichever kana, with accents or without."""
 
 _FINGERS: Final = (
     "thumb index mid middle ring pinky little finger fingers fingerbase metacarpal "
@@ -99,6 +112,8 @@ _RIG: Final = (
 )
 _HIRAGANA: Final = {code: code - 0x60 for code in range(ord("ァ"), ord("ヶ") + 1)}
 """Katakana, which one writes as well for the same word."""
+_ACCENTS: Final = dict.fromkeys(range(0x300, 0x370))
+
 _NO_PART: Final = frozenset(f"{_FINGERS} {_FACE} {_ENDS} {_RIG}".translate(_HIRAGANA).split())
 """A name with one of these is no landmark, whatever else it says."""
 
@@ -108,10 +123,17 @@ _FILLING: Final = frozenset(f"{_CHARACTER} jnt joint jt bone bn bind rig skeleto
 }
 """Says nothing of the body."""
 
+_LEFT: Final = (
+    "l left lft links gauche izquierdo izquierda izq esquerdo esquerda sinistro sinistra sx "
+    "左 ひだり"
+)
+_RIGHT: Final = (
+    "r right rgt rechts droit droite derecho derecha der direito direita destro destra dx 右 みぎ"
+)
 _SIDES: Final = MappingProxyType(
     {
-        **dict.fromkeys(("l", "left", "lft", "links", "左", "ひだり"), "L"),
-        **dict.fromkeys(("r", "right", "rgt", "rechts", "右", "みぎ"), "R"),
+        **dict.fromkeys(_LEFT.split(), "L"),
+        **dict.fromkeys(_RIGHT.split(), "R"),
     }
 )
 _SIDE_PREFIX: Final = re.compile(r"^(left|right|左|右|ひだり|みぎ|l|r)(?=.)")
@@ -137,10 +159,16 @@ _STRANGE_WORD: Final = 0.3
 """What is left of the weight of a name with a word that nobody knows ("head armour")."""
 
 
+def _plain(text: str) -> str:
+    """Without accents, which one writes or not, and in one kana."""
+    apart = unicodedata.normalize("NFKD", text).translate(_ACCENTS)
+    return unicodedata.normalize("NFKC", apart).translate(_HIRAGANA)
+
+
 def _meanings() -> dict[str, dict[str, float]]:
     found: dict[str, dict[str, float]] = {}
     for landmark, words in _WORDS.items():
-        for word in words.translate(_HIRAGANA).split():
+        for word in _plain(words).split():
             text, _, weight = word.partition("=")
             found.setdefault(text, {})[landmark] = float(weight or 1.0)
     return found
@@ -201,8 +229,7 @@ def _known(word: str) -> bool:
 
 def words_of(name: str) -> tuple[str, ...]:
     """The words of a bone's name, in small letters, without a namespace; numbers are words."""
-    plain = unicodedata.normalize("NFKC", name).translate(_HIRAGANA)
-    plain = _NAMESPACE.sub("", plain)
+    plain = _NAMESPACE.sub("", _plain(name))
     found: list[str] = []
     for part in re.split(r"[\W_]+", plain):
         if _VERTEBRA.match(part):

@@ -294,8 +294,9 @@ def _skipped(body: BodyProportions, before: int, bone: int, part: str, gap: floa
         name = body.names[between]
         step = float(np.linalg.norm(heads[child] - heads[between])) / max(gap, 1e-9)
         if not name.machinery:
-            # Another bone of the same part is no loss.
-            cost += min(step, 1.0) * (1.0 - min(name.weights.get(part, 0.0), 1.0))
+            # Another bone of the same part is no loss: "DEF-thigh → DEF-thigh.001".
+            alike = name.weights.get(part, 0.0) / max(body.weight(before, part), 1e-9)
+            cost += min(step, 1.0) * (1.0 - min(alike, 1.0))
         child = between
     return cost * (0.3 if part in {"clavicle", "foot"} else 2.0)
 
