@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,12 @@ import pytest
 
 from octo_motion.core.errors import OctoMotionError
 from octo_motion.core.rotations import Floats
+from octo_motion.device import bridge_process
+from octo_motion.device.messages import Settings
+from octo_motion.device.simulation import Simulation
+from octo_motion.ui.posing.device_hands import DeviceHands
 from octo_motion.ui.posing.puppet_session import PuppetSession, active_session
+from tests.device.test_shared_session import hand_message, joined
 
 TICK = 1.0 / 60.0
 
@@ -299,3 +306,61 @@ def test_a_script_poses_two_figures_with_two_hands_at_once(figure: Any, tmp_path
     path.write_text(json.dumps(script), encoding="utf-8")
     with pytest.raises(RuntimeError, match="no such armature"):
         bpy.ops.octo_motion.pose_script(filepath=str(path))
+
+
+# --- Devices -------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def steady(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No clock lengthens the bridge's steps."""
+    monkeypatch.setattr(bridge_process, "Simulation", partial(Simulation, clock=lambda: 0.0))
+
+
+def lead_by_device(session: PuppetSession, figure: Any, bone: str, far: float) -> None:
+    """A hand at a device takes hold of a bone's middle, goes so far along X, and lets go."""
+    client, bridge, _ = joined()
+    told = Settings(reach=0.2)
+    hands = DeviceHands(session, client, told, partial(next, count(0.0, 0.016)))
+    hands.tick(told)
+    start = np.array(figure.matrix_world @ figure.pose.bones[bone].center) * session.unit
+    way = np.array([far, 0.0, 0.0]) * session.unit
+    for number in range(1, 401):  # so many steps of the bridge, of 2 ms
+        at = start + min(1.0, number / 250) * way
+        bridge._heard[0] = hand_message(2e-3 * number, int(number < 360), (at[0], at[1], at[2]))
+        bridge.turn(2e-3 * number)
+        if number % 8 == 0:
+            hands.tick(told)
+        if number == 100:
+            assert client.pointers[0].body == session.body(bone)
+            assert session.core.shared
+    hands.tick(told)
+    assert not hands.holding
+
+
+@pytest.mark.usefixtures("steady")
+def test_a_box_is_pushed_by_a_limb_that_a_device_leads(
+    session: PuppetSession, figure: Any, box: Any
+) -> None:
+    start = place(box)
+    lead_by_device(session, figure, "part.2", 0.3)
+    pushed = place(box)
+    assert pushed[0] > start[0] + 0.1, "measured: 0.28"
+    assert pushed[2] == pytest.approx(0.1, abs=2e-3), "it slides on the floor"
+    assert {"Box", "part.2"} <= set(session.key())
+    assert frames_of(box) == {"location", "rotation_euler"}
+
+
+@pytest.mark.usefixtures("steady")
+def test_another_armature_is_pushed_by_a_limb_that_a_device_leads(figure: Any) -> None:
+    other = arm("Other", 0.25)
+    bpy.context.view_layer.update()
+    session = PuppetSession(figure, bpy.context.scene, clock=None, partners=[other])
+    before = np.array(other.pose.bones["part.2"].matrix)
+    lead_by_device(session, figure, "part.2", 0.35)
+    bpy.context.view_layer.update()
+    after = np.array(other.pose.bones["part.2"].matrix)
+    keyed = session.key()
+    session.cancel()
+    assert np.abs(after - before).max() > 0.15, "measured: 0.32"
+    assert {"part.2", "Other: part.2"} <= set(keyed)
