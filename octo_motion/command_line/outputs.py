@@ -16,8 +16,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import bpy
+import numpy as np
 
 from ..blender import files
+from ..blender.animation import curves_of, key_points
+from ..blender.rig import armature_data, bone_and_property
 from ..core.errors import RigError, WriteError
 from ..core.files import replace
 
@@ -198,6 +201,38 @@ def check_export(path: Path, armature: bpy.types.Object, scene: bpy.types.Scene)
         raise RigError(
             f"'{armature.name}' has no mesh, and Alembic keeps no bones.", "Export to .glb or .fbx."
         )
+
+
+_SCALED: Final = 0.01
+"""Share by which a bone's scale along itself may be off that across without a word."""
+
+
+def uncarried(path: Path, armature: bpy.types.Object) -> str:
+    """What a file of an armature's motion will play otherwise than Blender does, "" for nothing.
+
+    A bone that is scaled shears those that bend away from it in all formats that hand scale on from
+    bone to bone; Alembic keeps points of the skin, and has none.
+    """
+    data = armature.animation_data
+    if path.suffix.lower() == ".abc" or data is None or data.action is None:
+        return ""
+    found: dict[str, list[Any]] = {}
+    for curve in curves_of(data.action):
+        bone, name = bone_and_property(curve.data_path)
+        if name == "scale" and armature_data(armature).bones[bone].children:
+            found.setdefault(bone, []).append(key_points(curve, "co").reshape(-1, 2)[:, 1])
+    scaled = [
+        name
+        for name, values in found.items()
+        if np.ptp([each.min() for each in values] + [each.max() for each in values]) > _SCALED
+    ]
+    if not scaled:
+        return ""
+    return (
+        f"{path.suffix} hands the scale of bones on otherwise than Blender: {len(scaled)} bones "
+        f"that get longer ('{scaled[0]}') put arms off by some percent of their length there. Set "
+        "ground.stretch_as to location, or ground.stretch to 0."
+    )
 
 
 def export(

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,6 +20,7 @@ from ..core.locomotion.gait import gait_from_json
 from ..core.locomotion.rig import detect_arms
 from ..ui.locomotion import (
     Summary,
+    disconnect_arms,
     generate_locomotion,
     locomotion_settings,
     once_called,
@@ -29,7 +30,7 @@ from ..ui.locomotion import (
 from ..ui.posing import play_file
 from .follow_runner import follow
 from .job_report import ShotSummary, check_limits
-from .outputs import blender_said, check_export, export
+from .outputs import blender_said, check_export, export, uncarried
 from .retarget_runner import retarget
 from .schema import set_values
 from .shot_schema import NewRoute, ShotRequest, frame_rate, is_motion
@@ -97,10 +98,14 @@ def perform(
             summary = _pose(armature, scene, shot.script)
         else:
             _apply(shot, armature, scene)
+            if locomotion_settings(armature).ground.stretch_as == "LOCATION":
+                disconnect_arms(armature)
             summary = generate_locomotion(armature, bpy.context)
             check_limits(shot.limits, summary)
         if shot.octopus is not None or motion is not None:
             scene.frame_start, scene.frame_end = summary.frame_start, summary.frame_end
+        told = [each for path in shot.export if (each := uncarried(path, armature))]
+        summary = replace(summary, warnings=(*summary.warnings, *told))
         read = (*libraries, *(str(path) for path in clips.read))
         data = armature.animation_data
         action = data.action.name if data is not None and data.action is not None else ""

@@ -19,6 +19,7 @@ import bpy
 import pytest
 
 from octo_motion import command_line
+from octo_motion.blender.animation import curves_of
 from octo_motion.command_line import bake, commands, worker
 from octo_motion.core.errors import WriteError
 from tests.processes import has_console
@@ -642,6 +643,33 @@ def test_export_has_the_creature_and_its_motion_alone(
         seen = mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
         places.append(seen.matrix_world @ seen.data.vertices[0].co)
     assert (places[1] - places[0]).length > 0.1
+
+
+# Blender 5.2's exporter does what a later numpy will refuse.
+@pytest.mark.filterwarnings("ignore:Setting the shape on a NumPy array:DeprecationWarning")
+def test_what_a_format_does_not_carry_is_told_and_stretch_as_location_has_nothing_of_it(
+    tmp_path: Path,
+) -> None:
+    bent = "octopus = { arms = 4, joints = 6, with_mesh = false }\n"
+    way = "route = [[0, 0, 0], [0, -0.3, 0], [0.1, -0.5, 0], [0.3, -0.6, 0]]\n"
+    job = write(
+        tmp_path / "job.toml",
+        f'[[shots]]\nname = "scaled"\nexport = "a.glb"\n{bent}{way}'
+        f'[[shots]]\nname = "moved"\nexport = "b.glb"\noutput = "b.blend"\n{bent}{way}'
+        'settings = { ground.stretch_as = "location" }\n',
+    )
+    assert run_here("bake", job) == 0
+    (told,) = report(job)["scaled"]["warnings"]
+    assert told.startswith(".glb hands the scale of bones on otherwise than Blender: ")
+    assert "Set ground.stretch_as to location" in told
+    assert report(job)["moved"]["warnings"] == []
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "b.blend"))
+    armature: Any = bpy.data.objects["Octopus"]
+    assert not any(bone.use_connect for bone in armature.data.bones if "arm" in bone.name)
+    assert any(
+        curve.data_path.startswith('pose.bones["arm1.02.L"].location')
+        for curve in curves_of(armature.animation_data.action)
+    )
 
 
 def test_file_saved_in_edit_mode_is_as_good(scene: Path, tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ from .object_keys import ObjectKeys
 from .pose_assets import make_pose_action, make_pose_asset
 from .pose_keys import Keyed, PoseKeys, mark_file_changed
 from .poses import (
-    SCALE,
+    LENGTH,
     PoseValues,
     PropertyValues,
     animated_bones,
@@ -59,7 +59,7 @@ from .spliced_action import STEP, SplicedMotion, write_into, write_layer, write_
 
 __all__ = [
     "CYCLES",
-    "SCALE",
+    "LENGTH",
     "STEP",
     "Channel",
     "Keyed",

@@ -27,8 +27,8 @@ AT_REST: Final[Mapping[str, tuple[float, ...]]] = {
 }
 """Values of a bone's properties at rest."""
 
-SCALE: Final = ("scale",)
-"""Channels of a bone that stretches."""
+LENGTH: Final = ("scale", "location")
+"""Channels of bones that stretch."""
 _UNSCALED: Final = 1e-3
 _UNSHEARED: Final = 1e-3
 """Factors that are no scale, and cosines that are no shear."""

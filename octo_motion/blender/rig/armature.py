@@ -397,16 +397,66 @@ _CLOSE: Final = 1e-4
 """Bone lengths that a bone's head may be off its parent's tail."""
 
 
-def may_stretch(armature: bpy.types.Object, bones: Sequence[str]) -> bool:
-    """Whether the bones of an arm, root to tip, can be made longer without harm."""
+def may_stretch(
+    armature: bpy.types.Object, bones: Sequence[str], *, by_moving: bool = False
+) -> bool:
+    """Whether the bones of an arm, root to tip, can be made longer without harm: by their scale, or
+    by moving the one after each.
+    """
     data = armature_data(armature).bones
     chain = [data[name] for name in bones]
     for upper, lower in pairwise(chain):
-        if lower.parent != upper or lower.inherit_scale not in {ALIGNED, *_APART}:
+        if lower.parent != upper:
+            return False
+        if by_moving:
+            along = lower.use_local_location and lower.use_inherit_rotation
+            if lower.use_connect or not along:
+                return False
+            continue
+        if lower.inherit_scale not in {ALIGNED, *_APART}:
             return False
         if (lower.head_local - upper.tail_local).length > _CLOSE * upper.length:
             return False
     return True
+
+
+def connected_bones(armature: bpy.types.Object, arms: Sequence[Sequence[str]]) -> list[str]:
+    """Bones of arms, root to tip, that are connected to the one before, and so cannot be moved."""
+    data = armature_data(armature).bones
+    return [
+        name
+        for bones in arms
+        for before, name in pairwise(bones)
+        if name in data and data[name].use_connect and data[name].parent == data.get(before)
+    ]
+
+
+def disconnect_bones(armature: bpy.types.Object, bones: Sequence[str]) -> None:
+    """Let connected bones be moved. Nothing else changes.
+
+    Raises:
+        WriteError: the bones are linked, or the armature is hidden.
+    """
+    data = armature_data(armature)
+    if not data.is_editable:
+        raise WriteError(
+            phrase("The bones of '{armature}' are linked and read-only.", armature=armature.name),
+            "Open the file that they are from.",
+        )
+    layer = bpy.context.view_layer
+    assert layer is not None
+    if armature.name not in layer.objects or not armature.visible_get(view_layer=layer):
+        raise WriteError(
+            phrase("'{armature}' is hidden.", armature=armature.name),
+            "Show it and its collection.",
+        )
+    active, mode = layer.objects.active, armature.mode
+    layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    for name in bones:
+        data.edit_bones[name].use_connect = False
+    bpy.ops.object.mode_set(mode=mode)
+    layer.objects.active = active
 
 
 # --- Lists of settings in library overrides -------------------------------------------------------

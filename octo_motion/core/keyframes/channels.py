@@ -9,7 +9,7 @@ plain data, and so is all that is made of it here.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -49,6 +49,8 @@ OBJECT_GROUP: Final = "Object Transforms"
 _TURN: Final = 2.0 * np.pi
 _UNUSED: Final = 1e-5
 """Scales that differ from 1 by less need no keys."""
+_FLAT: Final = 1e-3
+"""Share of its length to which a bone shrinks at least."""
 
 
 def rotation_property(mode: str) -> str:
@@ -164,6 +166,10 @@ class RigChannels:
     """By bone, its rotation mode."""
     aligned: frozenset[str] = frozenset()
     """Bones that the one before makes longer with itself."""
+    moved: Mapping[str, tuple[str, Floats]] | None = None
+    """Where bones get longer by what comes after them being moved: by bone the one after it, and by
+    how much (3,), in its rest frame, where the bone is to be twice as long. None where they get
+    longer by their scale."""
     own: ObjectChannels | None = None
     """Those of the armature object, where they are wanted."""
 
@@ -197,7 +203,8 @@ class RigChannels:
 
     def handed(self, bones: Sequence[str]) -> list[bool]:
         """Of each bone of an arm, root to tip, whether the one before makes it longer."""
-        return [bool(place) and name in self.aligned for place, name in enumerate(bones)]
+        aligned = self.aligned if self.moved is None else frozenset[str]()
+        return [bool(place) and name in aligned for place, name in enumerate(bones)]
 
     def stretches(self, arms: Sequence[Sequence[str]], strains: Floats) -> list[Channel]:
         """Scales of bones that are longer by a share, and thinner so that they keep their volume.
@@ -207,7 +214,8 @@ class RigChannels:
             strains: (frames, bones) of all arms, one after the other.
 
         Returns:
-            Channels of those bones whose scale differs from 1 at some frame.
+            Channels of those bones whose scale differs from 1 at some frame; :meth:`written` has
+            them as locations, if that is how bones get longer.
         """
         channels: list[Channel] = []
         start = 0
@@ -218,7 +226,7 @@ class RigChannels:
                 along = longer[:, place]
                 if handed:
                     along = along / longer[:, place - 1]
-                if np.abs(along - 1.0).max() <= _UNUSED:
+                if np.abs(along - 1.0).max() <= _UNUSED or not self._gets_longer(name):
                     continue
                 across = 1.0 / np.sqrt(along)
                 channels.append(self.scale(name, np.stack([across, along, across], axis=1)))
@@ -245,6 +253,62 @@ class RigChannels:
                 longer = longer * own if handed else np.ones(count) * own
                 strains.append(longer - 1.0)
         return np.stack(strains, axis=1)
+
+    def _gets_longer(self, bone: str) -> bool:
+        return self.moved is None or bone in self.moved
+
+    def written(self, channels: Sequence[Channel]) -> list[Channel]:
+        """The same as Blender gets them: scales of bones that get longer by what comes after them
+        being moved become locations of that. Keys and handles go along, for a location is linear in
+        the scale.
+        """
+        moved = {self.path(name, "scale"): found for name, found in (self.moved or {}).items()}
+        result: dict[str, Channel] = {}
+        for each in channels:
+            own = each
+            if each.data_path in moved:
+                bone, way = moved[each.data_path]
+                # An arm's few keys stand in one group.
+                group = bone if each.keys is None else each.group
+                values = (each.values[:, 1:2] - 1.0) * way
+                keys = None if each.keys is None else _moving(each.keys, way)
+                own = Channel(self.path(bone, "location"), values, group, keys)
+            if (other := result.get(own.data_path)) is not None:
+                # A pose of the artist's may have moved it, too.
+                own = replace(own, values=own.values + other.values, keys=None)
+            result[own.data_path] = own
+        return list(result.values())
+
+    def given(
+        self, moves: Mapping[str, Floats], sizes: Mapping[str, Floats]
+    ) -> tuple[dict[str, Floats], dict[str, Floats]]:
+        """Inverse of :meth:`written`, of locations (3,) and scales (3,) of bones in a pose: how far
+        bones are moved because the one before is longer, as the scale of that.
+        """
+        left, scales = dict(moves), dict(sizes)
+        for name, (bone, way) in (self.moved or {}).items():
+            if bone not in left or not np.any(way):
+                continue
+            longer = float(left[bone] @ way / (way @ way))
+            left[bone] = left[bone] - longer * way
+            across = 1.0 / np.sqrt(max(1.0 + longer, _FLAT))
+            scales[name] = np.array([across, 1.0 + longer, across])
+        return left, scales
+
+
+def _moving(keys: BezierKeys, way: Floats) -> BezierKeys:
+    """Keys of a location (3,) that is as far along a way as a scale, of the second component, is
+    from 1.
+    """
+
+    def moved(values: NDArray[np.float32]) -> NDArray[np.float32]:
+        return ((values[:, 1:2].astype(np.float64) - 1.0) * way).astype(np.float32)
+
+    left, right = (
+        np.stack([np.repeat(side[:, 1:2, 0], 3, axis=1), moved(side[..., 1])], axis=-1)
+        for side in (keys.left, keys.right)
+    )
+    return replace(keys, values=moved(keys.values), left=left, right=right)
 
 
 # --- What keys play: values of Bézier curves ------------------------------------------------------

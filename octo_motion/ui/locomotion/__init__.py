@@ -3,7 +3,7 @@
 
 from ..steps import Step
 from . import operators, panels, settings, target_overlay
-from .operators import MENUS
+from .operators import MENUS, disconnect_arms
 from .settings import (
     AlongItem,
     ChangeItem,
@@ -34,6 +34,7 @@ __all__ = [
     "OCTO_MOTION_PG_locomotion",
     "ReachItem",
     "Summary",
+    "disconnect_arms",
     "generate_locomotion",
     "keep_look",
     "locomotion_settings",

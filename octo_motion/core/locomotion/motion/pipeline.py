@@ -185,7 +185,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     further = [replace(each, values=each.values[::every]) for each in further]
     result = MotionResult(
         plan=plan,
-        channels=[*channels, *further],
+        channels=plan.job.creature.channels.written([*channels, *further]),
         automatic=not reducing,
         arms=arms,
         carried=reached.carried if reached is not None else (),
@@ -362,7 +362,7 @@ def glimpse(plan: MotionPlan, frame: float) -> list[Glimpsed]:
     motion, further = _motion(plan, posed, moments[first:last], every_width=True)
     # A scale of 1 as well: what it is elsewhere in the motion is not known here.
     channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.widths, *motion.stretch]
-    channels += further
+    channels = plan.job.creature.channels.written([*channels, *further])
     return [Glimpsed(each.data_path, each.values[middle - first]) for each in channels]
 
 

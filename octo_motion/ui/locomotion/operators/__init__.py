@@ -20,7 +20,7 @@ from .adding import (
     draw_octopus_entry,
     draw_route_entry,
 )
-from .arms import OCTO_MOTION_PT_arms
+from .arms import OCTO_MOTION_PT_arms, disconnect_arms
 from .contacts import OCTO_MOTION_PT_contact, OCTO_MOTION_PT_ground, draw_rest
 from .edits import draw_edits
 from .gait_table import OCTO_MOTION_MT_gait, OCTO_MOTION_MT_gaits, OCTO_MOTION_PT_table
@@ -65,6 +65,7 @@ __all__ = [
     "OCTO_MOTION_PT_reaches",
     "OCTO_MOTION_PT_setups",
     "OCTO_MOTION_PT_table",
+    "disconnect_arms",
     "draw_edits",
     "draw_rest",
     "draw_setups",

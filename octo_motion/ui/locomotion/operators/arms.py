@@ -13,6 +13,8 @@ from bpy.props import BoolProperty, EnumProperty
 from ....blender.rig import (
     active_armature,
     armature_data,
+    connected_bones,
+    disconnect_bones,
     hidden_bones,
     read_skeleton,
     require_editable,
@@ -41,7 +43,15 @@ from ...operator_base import (
     RemoveOperator,
 )
 from ...panel_base import ArmaturePanel, ItemRows, draw_list
-from ..reading import add_item, body_axes, bones_of, placed_arms, write_arms, write_body
+from ..reading import (
+    add_item,
+    body_axes,
+    bones_of,
+    listed_arms,
+    placed_arms,
+    write_arms,
+    write_body,
+)
 from ..settings import AXES, locomotion_settings
 
 _SIDE_LETTERS: Final = {"LEFT": "L", "RIGHT": "R", "CENTER": "-"}
@@ -303,6 +313,36 @@ class OCTO_MOTION_OT_arm_collections(ArmatureOperator, bpy.types.Operator):
             raise RigError("The list has no arms.", "Detect them first.")
         made = phrase("{count} bone collections.", count=collect_arms(armature, settings))
         self.report({"INFO"}, reported(made))
+
+
+class OCTO_MOTION_OT_arms_disconnect(ArmatureOperator, bpy.types.Operator):
+    bl_idname = "octo_motion.arms_disconnect"
+    bl_label = "Disconnect Bones"
+    bl_description = (
+        "Let bones of the listed arms be moved: switch off Connected in their Relations. They stay "
+        "where they are, and nothing else of the armature changes. Stretch as Location needs it"
+    )
+
+    def run(self, context: bpy.types.Context) -> None:
+        armature = active_armature(context)
+        told = phrase("{count} bones disconnected.", count=disconnect_arms(armature))
+        self.report({"INFO"}, reported(told))
+
+
+def disconnect_arms(armature: bpy.types.Object) -> int:
+    """Let bones of an armature's arms, the listed ones or those that are found, be moved; how many
+    could not.
+
+    Raises:
+        RigError: it has no arms.
+        WriteError: the bones are linked, or the armature is hidden.
+    """
+    settings = locomotion_settings(armature)
+    arms, _, _ = listed_arms(settings, armature, read_skeleton(armature))
+    found = connected_bones(armature, [arm.bones for arm in arms])
+    if found:
+        disconnect_bones(armature, found)
+    return len(found)
 
 
 class OCTO_MOTION_PT_arms(ArmaturePanel, bpy.types.Panel):

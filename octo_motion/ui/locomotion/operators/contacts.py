@@ -8,14 +8,14 @@ from typing import Any, cast
 import bpy
 from bpy.props import FloatProperty
 
-from ....blender.rig import active_armature, require_editable
+from ....blender.rig import active_armature, connected_bones, require_editable
 from ....blender.scene import markers, remove_markers
 from ....core.errors import OctoMotionError, SettingsError
 from ....core.phrases import phrase
 from ...language import reported, translated
 from ...operator_base import ArmatureOperator, OctoOperator, show_in_local_view
 from ...panel_base import ArmaturePanel, TabPanel, armature_in
-from ..reading import resting
+from ..reading import bones_of, resting
 from ..settings import (
     OCTO_MOTION_PG_locomotion,
     changed_by_hand,
@@ -25,6 +25,7 @@ from ..settings import (
     store,
 )
 from ..writing import prepare, show_contacts
+from .arms import OCTO_MOTION_OT_arms_disconnect
 
 
 class OCTO_MOTION_OT_contacts_show(ArmatureOperator, bpy.types.Operator):
@@ -149,6 +150,17 @@ def draw_rest(layout: Any, settings: OCTO_MOTION_PG_locomotion) -> None:
     column.prop(ground, "rest_within")
 
 
+def _draw_stretch(column: Any, settings: Any) -> None:
+    """What other programs make of arms that get longer, or what keeps arms from it."""
+    ground = settings.ground
+    if not ground.stretch:
+        return
+    if ground.stretch_as == "SCALE":
+        column.label(text="Scale: not for glTF, FBX, USD", icon="INFO")
+    elif connected_bones(settings.id_data, [bones_of(item) for item in settings.arms]):
+        column.operator(OCTO_MOTION_OT_arms_disconnect.bl_idname, icon="UNLINKED")
+
+
 class OCTO_MOTION_PT_ground(ArmaturePanel, bpy.types.Panel):
     bl_label = "Hold the Ground"
     bl_parent_id = "OCTO_MOTION_PT_route"
@@ -163,10 +175,17 @@ class OCTO_MOTION_PT_ground(ArmaturePanel, bpy.types.Panel):
     def show(self, layout: Any, settings: Any) -> None:
         ground = settings.ground
         layout.active = ground.use and settings.table.manner != "SWIM"
-        for names in (("duty", "planted"), ("stretch", "lift"), ("lean", "smoothing")):
+        for names in (
+            ("duty", "planted"),
+            ("stretch", "stretch_as"),
+            ("lift",),
+            ("lean", "smoothing"),
+        ):
             column = layout.column(align=True)
             for name in names:
                 column.prop(ground, name)
+            if "stretch" in names:
+                _draw_stretch(column, settings)
         column = layout.column()
         column.active = ground.object is not None
         column.prop(ground, "up")

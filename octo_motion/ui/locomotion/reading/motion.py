@@ -12,7 +12,13 @@ import numpy as np
 
 from ....blender.animation import read_pose, standing_of, writable_object
 from ....blender.files import load_gait, sample_weight_curve
-from ....blender.rig import LimbReader, arm_skins, may_stretch, radii_of_skin
+from ....blender.rig import (
+    LimbReader,
+    arm_skins,
+    connected_bones,
+    may_stretch,
+    radii_of_skin,
+)
 from ....blender.scene import (
     can_be_carried,
     hangs_on,
@@ -287,6 +293,7 @@ def _given_pose(
     turns, moves, sizes = (
         {name: values[kind] for name, values in bones.items()} for kind in range(3)
     )
+    moves, sizes = creature.channels.given(moves, sizes)
     return GivenPose(turns, moves, sizes, place, given.frames)
 
 
@@ -314,6 +321,10 @@ def _given_place(
 _BARE: Final = (
     "The ground '{name}' is disabled in viewports or excluded: its modifiers do not count. Hide it "
     "with its eye in the outliner instead."
+)
+_CONNECTED: Final = (
+    "Bones of '{armature}' are connected and cannot be moved: its arms bend instead of getting "
+    "longer. Disconnect Bones, in the panel Hold the Ground, lets them."
 )
 
 
@@ -346,20 +357,23 @@ def read_ground(
     ground = settings.ground
     if not ground.use or not walks:
         return None
-    mesh, warnings = None, ()
+    mesh, warnings = None, list[str]()
     if ground.object is not None and settings.travel_on != "NONE":
         mesh = read_triangles(ground.object, depsgraph)
         if len(ground.object.modifiers) > 0 and not is_enabled(ground.object, depsgraph):
-            warnings = (phrase(_BARE, name=ground.object.name),)
+            warnings.append(phrase(_BARE, name=ground.object.name))
+    by_moving = creature.channels.moved is not None
+    if by_moving and ground.stretch > 0.0 and connected_bones(armature, creature.bones):
+        warnings.append(phrase(_CONNECTED, armature=armature.name))
     return GroundJob(
         stance=read_settings(StanceSettings, ground),
         skins=arm_skins(armature, creature.at_rest, creature.bones),
-        may_stretch=[may_stretch(armature, bones) for bones in creature.bones],
+        may_stretch=[may_stretch(armature, bones, by_moving=by_moving) for bones in creature.bones],
         mesh=mesh,
         overrides=tuple(overrides_for_core(dict(edits), creature.arms)),
         rest=resting(settings),
         rest_within=ground.rest_within,
-        warnings=warnings,
+        warnings=tuple(warnings),
     )
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, cast
 
 import bpy
 import numpy as np
 
 from ....blender.animation import (
-    SCALE,
+    LENGTH,
     animated_bones,
     as_posed,
     displaced_bones,
@@ -49,7 +49,7 @@ from ....core.locomotion.rig import (
     nearest_axis,
 )
 from ....core.phrases import phrase
-from ....core.rotations import Floats
+from ....core.rotations import Floats, conjugate, rotate
 from ....core.skeleton import Skeleton
 from ...declared_settings import assign, emptied, free_name
 from ..settings import OCTO_MOTION_PG_locomotion
@@ -199,6 +199,9 @@ def read_creature(
         [name for name in at_rest.names if name in moved or name in present],
         travels=settings.travel_on == "OBJECT",
     )
+    if settings.ground.stretch_as == "LOCATION":
+        ways = [carried_by_length(at_rest, arm.bones) for arm in arms]
+        channels = replace(channels, moved={name: way for each in ways for name, way in each})
     return RigRead(
         creature=Creature(
             skeleton=skeleton,
@@ -223,6 +226,18 @@ def read_creature(
             warnings_for_poses(settings, armature, arms, carriers) if settings.keep_pose else ()
         ),
     )
+
+
+def carried_by_length(
+    skeleton: Skeleton, bones: Sequence[str]
+) -> list[tuple[str, tuple[str, Floats]]]:
+    """Of each bone of an arm but the last the one after it, and how far (3,) that moves in its rest
+    frame where the bone gets twice as long.
+    """
+    numbers = [skeleton.index[name] for name in bones]
+    steps = np.diff(skeleton.heads[numbers], axis=0)
+    ways = rotate(conjugate(skeleton.rest_rotations[numbers[1:]]), steps)
+    return list(zip(bones[:-1], zip(bones[1:], ways, strict=True), strict=True))
 
 
 def uniform_scale(armature: bpy.types.Object) -> float:
@@ -449,7 +464,7 @@ def warnings_for_poses(
     """
     turned = [bone for arm in arms for bone in arm.bones]
     if (previous := previous_action(armature, settings)) is not None:
-        stretched_by_it = animated_bones(previous, SCALE)
+        stretched_by_it = animated_bones(previous, LENGTH)
         turned = [bone for bone in turned if bone not in stretched_by_it]
     found = [*displaced_bones(armature, turned, ()), *carriers]
     if not found:

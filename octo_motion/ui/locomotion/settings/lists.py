@@ -66,6 +66,16 @@ class ContactItem(bpy.types.PropertyGroup):
     )
 
 
+_SCALED: Final = (
+    "They are scaled, and get thinner as they get longer. Alembic plays the same; glTF, FBX and "
+    "USD hand scale on otherwise, and play arms off by some percent of their length"
+)
+_MOVED: Final = (
+    "The bone after each is moved; none is scaled. For games: glTF, FBX and USD play what Blender "
+    "plays. Bones must not be connected"
+)
+
+
 class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
     """How a walking creature stands on the ground."""
 
@@ -85,6 +95,14 @@ class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
     duty: declared(StanceSettings, "duty")
     planted: declared(StanceSettings, "planted")
     stretch: declared(StanceSettings, "stretch")
+    stretch_as: props.EnumProperty(
+        name="Stretch as",
+        description="What makes bones longer",
+        items=(
+            ("SCALE", "Scale", _SCALED, 0),
+            ("LOCATION", "Location", _MOVED, 1),
+        ),
+    )
     lift: declared(StanceSettings, "lift")
     lean: declared(StanceSettings, "lean")
     smoothing: declared(StanceSettings, "smoothing")

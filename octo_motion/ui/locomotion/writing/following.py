@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ....blender.animation import (
-    SCALE,
+    LENGTH,
     PropertyValues,
     animated_bones,
     show_values,
@@ -90,17 +90,18 @@ class Following:
             return
         values = {each.data_path: each.values.tolist() for each in glimpse(self._plan, frame)}
         for path in self._stretched(armature) - values.keys():
-            values[path] = [1.0, 1.0, 1.0]
+            values[path] = [0.0 if path.endswith(".location") else 1.0] * 3
         new = [path for path in values if path not in self.before]
         self.before.update(shown_values(armature, new))
         show_values(armature, values)
 
     def _stretched(self, armature: bpy.types.Object) -> set[str]:
-        """Paths of scales of the arms' bones that a motion before has moved."""
+        """Paths of scales and locations of the arms' bones that a motion before has moved."""
         previous = previous_action(armature, locomotion_settings(armature))
-        bones = animated_bones(previous, SCALE) if previous is not None else set[str]()
-        paths = {f'pose.bones["{bpy.utils.escape_identifier(each)}"].scale' for each in bones}
-        paths.update(path for path in self.before if path.endswith(".scale"))
+        paths = {path for path in self.before if path.endswith(LENGTH)}
+        for kind in LENGTH:
+            bones = animated_bones(previous, (kind,)) if previous is not None else set[str]()
+            paths |= {f'pose.bones["{bpy.utils.escape_identifier(each)}"].{kind}' for each in bones}
         own = {bone for arm in self.shot.job.creature.bones for bone in arm}
         return {path for path in paths if bone_and_property(path)[0] in own}
 
