@@ -80,3 +80,28 @@ def test_what_holds_goes_with_its_ground(*, platform: bool, drift: float) -> Non
     # Measured 19° and 20°.
     assert measures.turns(recording).value < 30.0
     assert measures.sudden_starts(recording) == 0
+
+
+def test_quality_tells_turns_as_they_play_where_an_arm_reaches() -> None:
+    armature, _ = _walk(platform=True)
+    settings = armature.octo_motion.locomotion
+    start = round(settings.result.frame_range[0])
+    reach = settings.reaches.add()
+    reach.name, reach.arm, reach.mode = "Curl", settings.arms[0].name, "CURL"
+    reach.frame_start, reach.frame_contact, reach.frame_release = start + 4, start + 8, start + 12
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.octo_motion.generate_locomotion()
+    first, last = (round(each) for each in settings.result.frame_range)
+    bones = [bone.name for arm in settings.arms for bone in arm.bones]
+    fastest, before = 0.0, None
+    for frame in range(first, last + 1):
+        bpy.context.scene.frame_set(frame)
+        seen = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        ways = np.array([seen.matrix_world @ seen.pose.bones[each].matrix for each in bones])
+        ways = ways[:, :3, :3] / np.linalg.norm(ways[:, :3, :3], axis=1, keepdims=True)
+        if before is not None:
+            cosine = 0.5 * (np.einsum("nij,nij->n", ways, before) - 1.0)
+            fastest = max(fastest, float(np.arccos(np.clip(cosine, -1.0, 1.0)).max()))
+        before = ways
+    # It was that of the plan, without what reaches.
+    assert settings.figures["TURN"].value == pytest.approx(fastest, abs=np.radians(0.5))

@@ -10,7 +10,7 @@ key to the next is no arc.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -199,6 +199,19 @@ class Measured:
     """What Blender plays, none where that is what was computed."""
     floor: Ground | None = None
     """What lies below where nothing is stood on, or in place; none where there is nothing."""
+    rolled_up: tuple[Poses, Poses] | None = None
+    """What plays on frames, and half way between them, where poses are those of a plan on ground
+    that is rolled out, or that moves; none where the plan is the world."""
+    ground_moves: bool = False
+    """Whether that ground moves: what holds is measured in the plan then."""
+
+    @property
+    def as_it_plays(self) -> Measured:
+        """The same of what plays in the world, whose ground is another."""
+        if self.rolled_up is None:
+            return self
+        poses, halfway = self.rolled_up
+        return replace(self, poses=poses, halfway=halfway, rolled_up=None)
 
     @property
     def moments(self) -> Floats:
@@ -222,12 +235,14 @@ def figures(measured: Measured) -> tuple[Figure, ...]:
 
     nowhere = measured.ground is None and measured.floor is None
     body = None if nowhere else _body(measured)
+    shown = measured.as_it_plays
     for number, name in enumerate(measured.names):
         arm = None if nowhere else _moving(measured, number)
+        seen = arm if arm is None or shown is measured else _moving(shown, number)
         if len(measured.frames) > 1:
-            turned = _turned(measured, number) if arm is None else arm.orientations[::2]
+            turned = _turned(shown, number) if seen is None else seen.orientations[::2]
             keep("TURN", change(turned, measured.frames), name)
-        if arm is None or body is None:
+        if arm is None or seen is None or body is None:
             continue
         length = measured.arms[number].length * measured.scale
         if measured.floor is not None:
@@ -238,14 +253,20 @@ def figures(measured: Measured) -> tuple[Figure, ...]:
             continue
         going = _going(measured, arm.joints)
         lying, cycles = _lying(measured, number)
-        keep("SLIP", slip(going[:, None], lying, cycles, np.array([length])), name, per_frame=2)
+        # What holds on to ground that moves goes with it, and rests in the plan alone.
+        held = going if shown is measured or measured.ground_moves else seen.joints
+        keep("SLIP", slip(held[:, None], lying, cycles, np.array([length])), name, per_frame=2)
         below = _below(measured, number, arm, going, measured.ground)
         deepest = _beside_walls(below, going[:, 1:] / length, measured.ground, length)
         keep("DEPTH", deepest, name, per_frame=2)
-        shown = arm.joints[::2] / length
-        rests = resting(shown[:, 1:], -below[::2], body / length, measured.rate)
-        keep("DRIFT", _worst(drifts(shown[:, 1:], rests, measured.rate)), name)
-        keep("STRAIN", strain(arm.strains), name)
+        own = arm.joints[::2, 1:] / length
+        rests = resting(own, -below[::2], body / length, measured.rate)
+        if shown is not measured:
+            # An arm that reaches, or is in a pose, does not lie where it was planned.
+            rests &= measured.lying[number][:, 1:]
+        creeping = own if held is going else held[::2, 1:] / length
+        keep("DRIFT", _worst(drifts(creeping, rests, measured.rate)), name)
+        keep("STRAIN", strain(seen.strains), name)
     for number, name in enumerate(measured.names):
         keep("MISS", miss(measured.misses[:, number : number + 1]), name)
     if measured.separation is not None:

@@ -173,6 +173,8 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     framed = along[0][::every], along[1][::every]
     stays = keyed[0][::every], keyed[1][::every]
     measured, overlaps = _measured(plan, planned.at(slice(None, None, every)), framed, stays)
+    if measured is not None and plan.carry is not None:
+        measured = _rolled_up(plan, measured, posed)
     # A key at every moment, unless fewer say the same.
     channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.widths, *motion.stretch]
     if reducing:
@@ -670,6 +672,26 @@ def _measured(
         floor=floor,
     )
     return measured, overlaps
+
+
+def _rolled_up(plan: MotionPlan, measured: Measured, posed: _Posed) -> Measured:
+    """What is measured of a plan with what plays of it, which reaches and poses have changed."""
+    arms, (locations, orientations), every = posed.arms, posed.going, plan.stride
+
+    def poses(part: slice) -> Poses:
+        own = arms.at(part)
+        return Poses(own.rotations, own.strains, locations[part], orientations[part])
+
+    on_frames = poses(slice(None, None, every))
+    between = poses(slice(1, None, 2)) if every == 2 else halfway_automatic(on_frames, cyclic=False)
+    now = arms.at(slice(None, None, every))
+    return replace(
+        measured,
+        rolled_up=(on_frames, between),
+        ground_moves=plan.carry is not None and plan.carry.carpet is not None,
+        lying=now.in_contact,
+        cycles=now.cycles,
+    )
 
 
 def _organs(
