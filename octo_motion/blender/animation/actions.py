@@ -451,9 +451,12 @@ def _write_curves(
             curve = curves.pop(place, None)
             if curve is None:
                 curve = channelbag.fcurves.new(channel.data_path, index=component)
+            group = curve.group
             # Dense and reduced keys are grouped in their own ways; otherwise the artist's stays.
-            regrouped = _has_own_handles(curve) != (channel.keys is not None)
-            if curve.group is None or (regrouped and curve.group.name != channel.group):
+            if group is None or (
+                group.name != channel.group
+                and _has_own_handles(curve) != (channel.keys is not None)
+            ):
                 curve.group = group_named(channelbag, channel.group)
             if channel.keys is not None:
                 digests[place], handles[place] = _write_bezier(curve, channel.keys, component)

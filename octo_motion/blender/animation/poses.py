@@ -167,8 +167,12 @@ def posed_channels(
         if bone is None:
             continue
         for channel in ("location", rotation_property(bone.rotation_mode), "scale"):
-            now, path = getattr(bone, channel), bone.path_from_id(channel)
-            away = not np.allclose(now, AT_REST[channel], rtol=0.0, atol=_UNMOVED)
+            # A few numbers at a time: numpy would take longer to be called than to compare them.
+            pairs = zip(getattr(bone, channel), AT_REST[channel], strict=True)
+            away = not all(abs(now - rest) <= _UNMOVED for now, rest in pairs)
+            if not (away or beneath):
+                continue
+            path = bone.path_from_id(channel)
             if (away and path not in passing) or path in beneath:
                 found.append((name, channel))
     return found

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from ..rotations import (
     Floats,
     conjugate,
-    continuous,
     continuous_axis_angle,
     continuous_euler,
     multiply,
@@ -67,12 +66,30 @@ def in_rotation_mode(quaternions: Floats, mode: str) -> Floats:
     about an axis go on past the half turn instead of jumping.
     """
     if mode == "QUATERNION":
-        result = continuous(quaternions)
-        # Rest is (1, 0, 0, 0): start on its side.
-        return np.where(result[:1, ..., :1] < 0.0, -result, result)
+        return _continuous_curves(quaternions)
     if mode == "AXIS_ANGLE":
         return continuous_axis_angle(quaternions)
     return continuous_euler(to_euler(quaternions, mode), mode)
+
+
+def _continuous_curves(quaternions: Floats) -> Floats:
+    """Quaternions (frames, …, 4) whose signs go on from frame to frame, from the side of rest on.
+
+    The frames of each component lie next to each other in memory: keys are written curve by curve.
+    """
+    curves = np.array(np.moveaxis(quaternions, 0, -1), order="C")
+    w, x, y, z = np.moveaxis(curves, -2, 0)
+    same = w[..., 1:] * w[..., :-1]
+    for each in (x, y, z):
+        same += each[..., 1:] * each[..., :-1]
+    away = np.empty(w.shape, dtype=bool)
+    # Rest is (1, 0, 0, 0).
+    np.less(w[..., :1], 0.0, out=away[..., :1])
+    np.less(same, 0.0, out=away[..., 1:])
+    if away.any():
+        np.logical_xor.accumulate(away, axis=-1, out=away)
+        np.negative(curves, out=curves, where=away[..., None, :])
+    return np.moveaxis(curves, -1, 0)
 
 
 def going_on_from(values: Floats, mode: str, start: Floats) -> Floats:

@@ -36,6 +36,7 @@ from ..rig import (
     halfway_automatic,
     loose_from_root,
     room_needed,
+    turns_in_world,
 )
 from .capsule_overlap import Capsules, Crowd, Opened, Separation, measure_overlap
 from .overlap_solver import parted
@@ -725,13 +726,13 @@ def eased_turns(
     """
     most = max(_FASTEST / rate, _IN_A_CYCLE / per_cycle)
     result, changed, start = rotations, np.zeros((len(rotations), len(arms))), 0
+    fast = (turns_in_world(arms, rotations, orientations, every) > most).any(axis=0)
     for number, arm in enumerate(arms):
         own = slice(start, start + len(arm.bones))
         start = own.stop
-        before = multiply(orientations[:, None], arm.from_bones(rotations[:, own]))
-        if not _faster(before, most, every).any():
+        if not fast[own].any():
             continue
-        before = continuous(before)
+        before = continuous(multiply(orientations[:, None], arm.from_bones(rotations[:, own])))
         if cyclic and np.any(np.sum(before[-1] * before[0], axis=-1) < 0.0):
             continue
         frames, share = _eased(
@@ -776,13 +777,9 @@ def largest_turns(
     arms: Sequence[ArmFrames], rotations: Floats, orientations: Floats, every: int
 ) -> Floats:
     """Radians (arms,) by which some bone of each turns from a frame to the next at most."""
-    found, start = [], 0
-    for arm in arms:
-        own = slice(start, start + len(arm.bones))
-        start = own.stop
-        frames = multiply(orientations[:, None], arm.from_bones(rotations[:, own]))
-        found.append(_turns(frames, every).max(initial=0.0))
-    return np.array(found)
+    turned = turns_in_world(arms, rotations, orientations, every).max(axis=0, initial=0.0)
+    starts = np.cumsum([0, *(len(arm.bones) for arm in arms[:-1])])
+    return np.maximum.reduceat(turned, starts)
 
 
 def _faster(frames: Floats, most: float, every: int) -> np.ndarray:

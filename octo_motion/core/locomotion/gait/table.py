@@ -195,7 +195,7 @@ def gait_angles(
 def columns_by_curve(table: GaitTable, pairs: tuple[int, ...]) -> dict[int, np.ndarray]:
     """Arms grouped by the curve that they use."""
     keys = np.array([pair if pair in table.curves else 0 for pair in pairs])
-    return {int(key): np.flatnonzero(keys == key) for key in np.unique(keys)}
+    return {key: np.flatnonzero(keys == key) for key in sorted(set(keys.tolist()))}
 
 
 def curve_from_degrees(phases: list[float], **angles: list[list[float]]) -> GaitCurve:

@@ -160,7 +160,9 @@ def _modes(creature: Creature, bones: Sequence[str]) -> list[str]:
 
 
 def _tracks(channels: Sequence[Channel], kinds: Sequence[str]) -> list[Track]:
-    return [Track(channel.values, kind) for channel, kind in zip(channels, kinds, strict=True)]
+    # In memory channels lie curve by curve, and tracks are searched frame by frame.
+    values = [np.ascontiguousarray(channel.values) for channel in channels]
+    return [Track(own, kind) for own, kind in zip(values, kinds, strict=True)]
 
 
 def _travel(creature: Creature, motion: Motion, tolerances: Tolerances) -> tuple[Limb, float]:

@@ -363,7 +363,9 @@ class Route:
             start, middle, end = start[rough], middle[rough], end[rough]
             found.append(middle)
             start, end = np.concatenate([start, middle]), np.concatenate([middle, end])
-        return np.unique(np.concatenate(found))
+        # Not by numpy.unique, which has numpy.ma imported first: 9 ms of the first motion.
+        cuts = np.sort(np.concatenate(found))
+        return cuts[np.append(True, cuts[1:] > cuts[:-1])]
 
     @cached_property
     def _distances(self) -> Floats:

@@ -26,6 +26,7 @@ from .bone_rotations import (
     rotate_bones,
     sucker_sides,
     transport_frames,
+    turns_in_world,
 )
 from .detection import Detection, detect_arms
 from .joint_room import (
@@ -100,4 +101,5 @@ __all__ = [
     "stretch_mantle",
     "sucker_sides",
     "transport_frames",
+    "turns_in_world",
 ]

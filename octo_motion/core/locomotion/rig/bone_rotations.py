@@ -70,15 +70,22 @@ class ArmRest:
                 result[..., bone, :] = multiply(result[..., bone - 1, :], result[..., bone, :])
         return result
 
-    def straight_on(self, bone: int) -> Floats:
-        """(3,) unit, in its rest frame: where a bone points by way of which it is turned.
+    @cached_property
+    def straight_on(self) -> Floats:
+        """(bones, 3) unit, in the bones' rest frames: where each points by way of which it is
+        turned.
 
         It goes on from the bone before, or out of the body: at rest it may be bent far from that.
         """
         if self.outward is None:
-            return self.segments[bone]
-        back = conjugate(self.carried[bone])
-        return rotate(back, self.segments[bone - 1] if self.follows[bone] else self.outward)
+            return self.segments
+        before = np.array(
+            [
+                self.segments[bone - 1] if follows else self.outward
+                for bone, follows in enumerate(self.follows)
+            ]
+        )
+        return rotate(conjugate(self.carried), before)
 
 
 _rests: Final[ContentCache[ArmRest]] = ContentCache(_MOST_KNOWN)
@@ -165,13 +172,12 @@ def rotate_bones(
     turns, twists = np.empty((bones, 4, batch)), half.copy()
     orientation = np.zeros((4, batch))
     orientation[0] = 1.0
-    banked = np.cumsum(2.0 * half, axis=0)
-    cosines, sines = np.cos(banked), np.sin(banked)
     own = _tiled([rest.carried for rest in rests], frames)
     segments = _tiled([rest.segments for rest in rests], frames)
     first, between = _straightened(rests, segments, frames)
     follows = np.array([rest.follows for rest in rests]).T
     sides = _tiled(facing.sides, frames) if facing is not None else None
+    banked = np.cumsum(2.0 * half, axis=0) if facing is not None else half
     for bone in range(bones):
         carried = own[bone]
         if np.all(follows[bone]):
@@ -194,9 +200,10 @@ def rotate_bones(
             towards = facing.towards[bone].reshape(3, batch)
             sine = dot(components_first.cross(side, towards), wanted[bone])
             cosine = dot(side, towards) - dot(side, wanted[bone]) * dot(towards, wanted[bone])
-            askew = sines[bone] * cosine + cosines[bone] * sine
+            seen, aside = np.cos(banked[bone]), np.sin(banked[bone])
+            askew = aside * cosine + seen * sine
             # Where all face away, each would add its own to what those before it turned.
-            right = cosines[bone] * cosine - sines[bone] * sine
+            right = seen * cosine - aside * sine
             askew *= 0.5 * (1.0 + right)
             twisted += 0.5 * facing.most_turn[bone].reshape(batch) * askew
         if np.any(twisted):
@@ -215,7 +222,7 @@ def _straightened(
     """
     if all(rest.outward is None for rest in rests):
         return None, segments
-    on = np.array([[each.straight_on(bone) for bone in range(len(segments))] for each in rests])
+    on = np.array([each.straight_on for each in rests])
     own = np.array([rest.segments for rest in rests])
     flat = components_first.shortest_arc(own.reshape(-1, 3).T, on.reshape(-1, 3).T)
     turns = flat.T.reshape(*on.shape[:2], 4)
@@ -406,14 +413,18 @@ class ArmBatch:
             np.stack([np.array(arm.rest.follows) for arm in arms], axis=-1),
         )
 
-    def orientations(self, rotations: Floats, arm: np.ndarray) -> Floats:
+    def orientations(
+        self, rotations: Floats, arm: np.ndarray, armature: Floats | None = None
+    ) -> Floats:
         """Orientations (bones, 4, batch) in armature space, of rotations (bones, 4, batch) in each
-        bone's rest frame; ``arm`` (batch,) is which of the arms each one is.
+        bone's rest frame; ``arm`` (batch,) is which of the arms each one is. They are of the world
+        where that of the armature (4, batch) is given.
         """
         result = np.empty(rotations.shape)
         for bone, own in enumerate(rotations):
             before = result[bone - 1] if bone else None
-            result[bone] = components_first.multiply(self._carried(bone, arm, before), own)
+            carried = self._carried(bone, arm, before, armature)
+            result[bone] = components_first.multiply(carried, own)
         return result
 
     def rotations(self, orientations: Floats, arm: np.ndarray) -> Floats:
@@ -426,18 +437,23 @@ class ArmBatch:
             result[bone] = components_first.multiply(back, own)
         return result
 
-    def _carried(self, bone: int, arm: np.ndarray, before: Floats | None) -> Floats:
-        """Where a bone of arms (batch,) is when it is not turned (4, batch), in armature space.
+    def _carried(
+        self, bone: int, arm: np.ndarray, before: Floats | None, armature: Floats | None = None
+    ) -> Floats:
+        """Where a bone of arms (batch,) is when it is not turned (4, batch), in armature space or
+        that of the armature (4, batch).
 
         That hangs on the orientation of the bone before (4, batch).
         """
         carried = self.carried[bone][:, arm]
         follows = self.follows[bone]
-        if before is None or not follows.any():
+        if before is None or not follows.all():
             # Of those that follow nothing it is in armature space already.
-            return carried
-        taken = components_first.multiply(before, carried)
-        return taken if follows.all() else np.where(follows[arm], taken, carried)
+            free = carried if armature is None else components_first.multiply(armature, carried)
+            if before is None or not follows.any():
+                return free
+            return np.where(follows[arm], components_first.multiply(before, carried), free)
+        return components_first.multiply(before, carried)
 
     def joints(self, orientations: Floats, arm: np.ndarray, strains: Floats) -> Floats:
         """Joints P₀ … Pₙ (bones + 1, 3, batch) in armature space, of orientations (bones, 4,
@@ -464,3 +480,40 @@ def batches_by_bones(arms: Sequence[ArmFrames]) -> list[tuple[list[int], ArmBatc
         (numbers, ArmBatch.of([arms[number] for number in numbers]))
         for numbers in by_bones.values()
     ]
+
+
+_TURNS_AT_ONCE: Final = 40_000
+"""Bones times moments whose turns are worked out in one portion, which the cache then holds."""
+
+
+def turns_in_world(
+    arms: Sequence[ArmFrames], rotations: Floats, orientations: Floats, every: int = 1
+) -> Floats:
+    """Radians (moments − every, bones) by which bones turn in the world within a frame.
+
+    Args:
+        arms: in the order of their bones.
+        rotations: (moments, bones, 4) of all arms, one after the other, in the bones' rest frames.
+        orientations: (moments, 4) of the armature, world.
+        every: at every how many moments there is a frame.
+    """
+    count = max(len(rotations) - every, 0)
+    result = np.empty((count, rotations.shape[1]))
+    ends = np.cumsum([0, *(len(arm.bones) for arm in arms)])
+    step = max(1, _TURNS_AT_ONCE // max(rotations.shape[1], 1))
+    for numbers, batch in batches_by_bones(arms):
+        bones = np.stack([np.arange(*ends[number : number + 2]) for number in numbers], axis=-1)
+        for start in range(0, count, step):
+            part = slice(start, min(start + step, count) + every)
+            own = rotations[part].transpose(1, 2, 0)[bones.T].transpose(1, 2, 0, 3)
+            arm = np.repeat(np.arange(len(numbers)), own.shape[3])
+            going = np.tile(orientations[part].T, (1, len(numbers)))
+            own = own.reshape(*own.shape[:2], -1)
+            world = batch.orientations(own, arm, going).reshape(*own.shape[:2], len(numbers), -1)
+            same = np.einsum("bcaf,bcaf->fba", world[..., every:], world[..., :-every])
+            result[part.start : part.stop - every, bones] = same
+    np.abs(result, out=result)
+    np.minimum(result, 1.0, out=result)
+    np.arccos(result, out=result)
+    result *= 2.0
+    return result
