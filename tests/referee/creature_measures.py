@@ -8,7 +8,7 @@ solvers: what rests is told by that it lies on the ground and is not carried alo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -176,7 +176,8 @@ def _gaps(recording: Recording, rows: Integers, surface: Surface, height: float)
     covered = np.zeros(len(rows), bool)
     for skin in recording.skins:
         for column, row in enumerate(rows):
-            points = skin.points[:, skin.bones == row]
+            # A web that touches the ground is no arm that rests.
+            points = skin.points[:, (skin.bones == row) & ~skin.web]
             covered[column] |= points.shape[1] > 0
             over = np.full(points.shape[:-1], np.inf)
             some = surface.near(points, height)
@@ -221,12 +222,12 @@ class Passing:
 
 
 def skin_through_skin(
-    recording: Recording, arms: Sequence[Sequence[str]], every: int = 6
+    recording: Recording, arms: Sequence[Sequence[str]], every: int = 6, *, webs: bool = False
 ) -> Passing:
     """Arms that pass through each other or through the body, as faces that cut each other.
 
     Faces that cut at rest are modelled so and do not count; nor do those of one arm, whose inside
-    folds where it bends.
+    folds where it bends; nor, unless that is asked for, those of webs between arms.
     """
     limb = np.full(len(recording.names) + 1, -1)
     for number, arm in enumerate(arms):
@@ -235,6 +236,9 @@ def skin_through_skin(
     counts = np.zeros((len(picked), 1))
     where = [""]
     for skin in recording.skins:
+        if not webs and skin.web.any():
+            kept = [face for face in skin.faces if not skin.web[list(face)].any()]
+            skin = replace(skin, faces=kept)  # noqa: PLW2901 - the same skin, less of it
         owners = np.array([limb[_majority(skin, face)] for face in skin.faces])
         built_so = _cuts(skin, skin.rest, owners)
         for place, moment in enumerate(picked):

@@ -19,6 +19,9 @@ Floats = NDArray[np.floating[Any]]
 Integers = NDArray[np.integer[Any]]
 Flags = NDArray[np.bool_]
 
+WEB = "Web"
+"""Vertex group of a skin that is a web between limbs, and no limb's own."""
+
 
 @dataclass(frozen=True, eq=False)
 class Skin:
@@ -33,6 +36,8 @@ class Skin:
     faces: list[tuple[int, ...]]
     bones: Integers
     """(vertices,) the bone that each vertex follows most, -1 for none."""
+    web: Flags
+    """(vertices,) whether it is a web between limbs, by the vertex group that says so."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +166,10 @@ def _skin(mesh: bpy.types.Object, points: Floats, rows: dict[str, int]) -> Skin:
     data.edges.foreach_get("vertices", edges)
     groups = [rows.get(group.name, -1) for group in mesh.vertex_groups]
     bones = np.full(len(data.vertices), -1)
+    web = np.zeros(len(data.vertices), bool)
+    said = mesh.vertex_groups.find(WEB)
     for vertex in data.vertices:
+        web[vertex.index] = any(each.group == said for each in vertex.groups)
         felt = [each for each in vertex.groups if groups[each.group] >= 0]
         if felt:
             bones[vertex.index] = groups[max(felt, key=lambda each: each.weight).group]
@@ -172,4 +180,5 @@ def _skin(mesh: bpy.types.Object, points: Floats, rows: dict[str, int]) -> Skin:
         edges.reshape(-1, 2).astype(np.int64),
         [tuple(np.array(face.vertices).tolist()) for face in data.polygons],
         bones,
+        web,
     )

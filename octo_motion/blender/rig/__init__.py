@@ -4,6 +4,7 @@
 from .armature import (
     ALIGNED,
     SUCKER_PROPERTY,
+    WEB_ATTRIBUTE,
     active_armature,
     arm_skins,
     armature_data,
@@ -46,6 +47,7 @@ from .puppet_reading import (
 __all__ = [
     "ALIGNED",
     "SUCKER_PROPERTY",
+    "WEB_ATTRIBUTE",
     "LimbReader",
     "Puppet",
     "PuppetRig",

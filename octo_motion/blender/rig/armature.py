@@ -539,6 +539,8 @@ _ROUNDED: Final = 1e-6
 """To which a skin's place on its armature is known."""
 _BONE_ROOT, _BONE_TIP = 0.06, 0.012
 """Radius in arm lengths at root and tip of an arm without skin."""
+WEB_ATTRIBUTE: Final = "octo_motion_web"
+"""Boolean attribute of a skin's vertices: true where they are a web between limbs, no limb."""
 
 
 def vertex_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
@@ -549,6 +551,20 @@ def vertex_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
         attribute: Any = mesh.attributes["position"]
         attribute.data.foreach_get("vector", points.ravel())
     return points
+
+
+def limb_skin(mesh: bpy.types.Mesh) -> NDArray[np.int64]:
+    """Vertices (n,) of a mesh that tell how thick limbs are: all but a web between them."""
+    web = mesh.attributes.get(WEB_ATTRIBUTE)
+    if (
+        not isinstance(web, bpy.types.BoolAttribute)
+        or web.domain != "POINT"
+        or len(web.data) != len(mesh.vertices)
+    ):
+        return np.arange(len(mesh.vertices))
+    flags = np.zeros(len(mesh.vertices), dtype=bool)
+    web.data.foreach_get("value", flags)
+    return np.flatnonzero(~flags)
 
 
 def radii_of_skin(armature: bpy.types.Object, chains: Sequence[Sequence[str]]) -> list[Floats]:
@@ -656,18 +672,19 @@ def _of_chain(
 
 def _meshes(
     armature: bpy.types.Object,
-) -> Iterator[tuple[bpy.types.Object, Floats, int]]:
-    """Meshes that the armature deforms, points of theirs, and at every how many these are."""
+) -> Iterator[tuple[bpy.types.Object, Floats, NDArray[np.int64]]]:
+    """Meshes that the armature deforms, points of theirs, and which vertices these are."""
     inverse = np.array(armature.matrix_world.inverted_safe(), dtype=np.float64)
     for item in deformed_meshes(armature):
         mesh = item.data
         assert isinstance(mesh, bpy.types.Mesh)
-        step = max(1, -(-len(mesh.vertices) // _MOST_VERTICES))
-        points = vertex_positions(mesh)
+        numbers = limb_skin(mesh)
+        numbers = numbers[:: max(1, -(-len(numbers) // _MOST_VERTICES))]
+        points = vertex_positions(mesh)[numbers]
         matrix = inverse @ np.array(item.matrix_world, dtype=np.float64)
         # Wherever the armature has walked to, its skin is as thick.
         matrix = np.round(matrix / _ROUNDED) * _ROUNDED
-        yield item, points[::step] @ matrix[:3, :3].T + matrix[:3, 3], step
+        yield item, points @ matrix[:3, :3].T + matrix[:3, 3], numbers
 
 
 def _followers(armature: bpy.types.Object) -> Iterator[tuple[str, Floats]]:
@@ -677,15 +694,15 @@ def _followers(armature: bpy.types.Object) -> Iterator[tuple[str, Floats]]:
     """
     assert isinstance(armature.data, bpy.types.Armature)
     bones = armature.data.bones
-    for item, moved, step in _meshes(armature):
+    for item, moved, numbers in _meshes(armature):
         assert isinstance(item.data, bpy.types.Mesh)
         names = {group.index: group.name for group in item.vertex_groups if group.name in bones}
         owner = np.full(len(moved), -1)
         vertices = item.data.vertices
-        for number in range(len(moved)):
-            groups = [each for each in vertices[number * step].groups if each.group in names]
+        for place, number in enumerate(numbers.tolist()):
+            groups = [each for each in vertices[number].groups if each.group in names]
             if groups:
-                owner[number] = max(groups, key=lambda each: each.weight).group
+                owner[place] = max(groups, key=lambda each: each.weight).group
         for group in np.unique(owner[owner >= 0]).tolist():
             yield names[group], moved[owner == group]
 
@@ -729,7 +746,7 @@ def _skin(armature: bpy.types.Object, size: float) -> Floats:
     for item in deformed_meshes(armature):
         mesh = item.data
         assert isinstance(mesh, bpy.types.Mesh)
-        points = vertex_positions(mesh)
+        points = vertex_positions(mesh)[limb_skin(mesh)]
         place = inverse @ np.array(item.matrix_world, dtype=np.float64)
         # Wherever the armature has walked to, its skin is as thick.
         place[:3, :3] = np.round(place[:3, :3] / _PLACED_TO) * _PLACED_TO

@@ -38,6 +38,7 @@ from .armature import (
     armature_data,
     driven_channels,
     even_scale,
+    limb_skin,
     pose_of,
     read_skeleton,
     vertex_positions,
@@ -554,9 +555,10 @@ def _vertices(shown: bpy.types.Object) -> Floats:
 
 def _owners(mesh: bpy.types.Mesh, bone_of_group: list[int], sums: Floats) -> dict[int, int]:
     """The bone that moves each looked-at vertex most; adds all weights to the bones' sums."""
-    step = -(-len(mesh.vertices) // _MOST_VERTICES)
+    numbers = limb_skin(mesh)
+    step = max(1, -(-len(numbers) // _MOST_VERTICES))
     owners: dict[int, int] = {}
-    for number in range(0, len(mesh.vertices), step):
+    for number in numbers[::step].tolist():
         best, most, total = -1, 0.0, 0.0
         for each in mesh.vertices[number].groups:
             bone = bone_of_group[each.group] if each.group < len(bone_of_group) else -1

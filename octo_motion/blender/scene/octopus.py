@@ -23,9 +23,11 @@ from ...core.locomotion.octopus import (
     build_bones,
     build_mesh,
 )
-from ..rig import ALIGNED, SUCKER_PROPERTY
+from ..rig import ALIGNED, SUCKER_PROPERTY, WEB_ATTRIBUTE
 
 _NAME: Final = "Octopus"
+WEB_GROUP: Final = "Web"
+"""Vertex group by which an artist selects the web, paints or pins it."""
 OWN_COLLECTION: Final = "octo_motion_creature"
 """Custom property of a collection that was made for a creature and what belongs to it."""
 _Colour = tuple[float, float, float]
@@ -182,11 +184,22 @@ def _new_skin(
     # Weights know bones by number, so every bone has a group, also those that move nothing.
     for name in bone_names:
         item.vertex_groups.new(name=name)
+    if skin.web.any():
+        _mark_web(item, mesh, skin)
     modifier = item.modifiers.new("Armature", "ARMATURE")
     assert isinstance(modifier, bpy.types.ArmatureModifier)
     modifier.object = armature
     collection.objects.link(item)
     return item
+
+
+def _mark_web(item: bpy.types.Object, mesh: bpy.types.Mesh, skin: OctopusMesh) -> None:
+    """Say which vertices are the web's, to artists and to whoever measures how thick arms are."""
+    group = item.vertex_groups.new(name=WEB_GROUP)
+    group.add(np.flatnonzero(skin.web).tolist(), 1.0, "REPLACE")
+    mark = mesh.attributes.new(WEB_ATTRIBUTE, "BOOLEAN", "POINT")
+    assert isinstance(mark, bpy.types.BoolAttribute)
+    mark.data.foreach_set("value", skin.web)
 
 
 def _new_mesh(skin: OctopusMesh) -> bpy.types.Mesh:

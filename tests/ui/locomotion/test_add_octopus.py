@@ -117,11 +117,28 @@ def test_the_redo_panels_numbers_arrive_at_the_rig() -> None:
     assert len(bpy.data.meshes) == 0
 
 
+def web_of(**options: Any) -> float:
+    """How far from the middle the web goes, in metres; zero without one."""
+    skin = add_octopus(**options).children[0]
+    web = skin.vertex_groups.find("Web")
+    points = [v.co for v in skin.data.vertices if any(each.group == web for each in v.groups)]
+    return max((float(np.hypot(point.x, point.y)) for point in points), default=0.0)
+
+
+def test_the_redo_panel_has_a_web_and_its_reach() -> None:
+    usual = web_of()
+    assert usual > 0.0
+    assert web_of(web_reach=0.5) > 1.2 * usual
+    assert web_of(web_reach=0.0) == web_of(web=False) == web_of(web=False, web_reach=0.5) == 0.0
+
+
 def test_the_defaults_are_the_shapes_own() -> None:
     rna: Any = bpy.ops.octo_motion.add_octopus.get_rna_type().properties
     default = OctopusShape()
     for name in ("arms", "joints", "arm_length", "first_diameter", "taper"):
         assert rna[name].default == pytest.approx(getattr(default, name))
+    assert rna["web"].default
+    assert rna["web_reach"].default == pytest.approx(default.web)
 
 
 def test_every_number_has_its_unit_and_says_what_it_does() -> None:
@@ -129,7 +146,7 @@ def test_every_number_has_its_unit_and_says_what_it_does() -> None:
     subtypes = {"arm_length": "DISTANCE", "first_diameter": "DISTANCE", "taper": "FACTOR"}
     for name, subtype in subtypes.items():
         assert rna[name].subtype == subtype
-    for name in (*subtypes, "arms", "joints", "with_mesh"):
+    for name in (*subtypes, "arms", "joints", "with_mesh", "web", "web_reach"):
         assert len(rna[name].description) > 20
         assert not rna[name].description.endswith(".")
 
@@ -154,7 +171,10 @@ def test_the_limits_of_every_parameter_build(options: dict[str, Any]) -> None:
     armature = add_octopus(**options)
     arms, joints = options.get("arms", 8), options.get("joints", 12)
     assert len(armature.data.bones) == 7 + arms * joints
-    assert len(armature.children[0].vertex_groups) == len(armature.data.bones)
+    groups = [group.name for group in armature.children[0].vertex_groups]
+    assert [name for name in groups if name != "Web"] == [b.name for b in armature.data.bones]
+    # Two arms have no web, and arms of three bones only if it reaches beyond their roots.
+    assert arms > 2 or "Web" not in groups
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 
 from .mesh import build_mesh
 from .rig import ARM_COLLECTIONS, FIRST_ARM_BONE, SUCKER_AXIS, OctopusBones, build_bones
-from .shape import ARMS, JOINTS, OctopusShape
+from .shape import ARMS, JOINTS, WEB, OctopusShape
 from .surface import OctopusMesh, SkinMaterial
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "FIRST_ARM_BONE",
     "JOINTS",
     "SUCKER_AXIS",
+    "WEB",
     "OctopusBones",
     "OctopusMesh",
     "OctopusShape",

@@ -34,6 +34,7 @@ from .surface import (
     rigid,
     sheet_quads,
 )
+from .web import add_web
 
 
 def build_mesh(shape: OctopusShape) -> OctopusMesh:
@@ -50,9 +51,17 @@ def build_mesh(shape: OctopusShape) -> OctopusMesh:
     _add_mantle_end(surface, form, above[0])
     _add_mouth(surface, lower.points[0], below[0])
     _add_underside(surface, layout, lower, below)
-    _add_web_margin(surface, layout, _by_arm(above[-1], upper), _by_arm(below[-1], lower))
-    _add_arms(surface, layout, (upper, above), (lower, below))
-    return surface.mesh()
+    margins = (
+        _between(layout, _by_arm(above[-1], upper)),
+        _between(layout, _by_arm(below[-1], lower)),
+    )
+    if not layout.web_rows:
+        _add_web_margin(surface, margins)
+    tubes = _add_arms(surface, layout, (upper, above), (lower, below))
+    without_web = surface.count
+    if layout.web_rows:
+        _add_web_margin(surface, add_web(surface, layout, margins, tubes))
+    return surface.mesh(without_web)
 
 
 def _by_arm(row: Indices, sheet: Sheet) -> Indices:
@@ -102,16 +111,16 @@ def _add_underside(surface: Surface, layout: ArmLayout, lower: Sheet, below: Ind
     surface.add_quads(quads[BEAK_ROWS:][~in_strip[BEAK_ROWS:]], SkinMaterial.UNDERSIDE)
 
 
-def _add_web_margin(surface: Surface, layout: ArmLayout, upper: Indices, lower: Indices) -> None:
-    """Faces between the last rows (arms, sector) of both sheets, from each arm to the next."""
+def _between(layout: ArmLayout, row: Indices) -> Indices:
+    """Of a row (arms, sector) what lies from each arm to the next, (arms, web + 1)."""
     half = layout.columns.web // 2
+    following = np.roll(row, -1, axis=0)
+    return np.concatenate([row[:, -half:], following[:, : half + 1]], axis=1)
 
-    def margin(row: Indices) -> Indices:
-        following = np.roll(row, -1, axis=0)
-        return np.concatenate([row[:, -half:], following[:, : half + 1]], axis=1)
 
-    edges = np.stack([margin(upper), margin(lower)], axis=1)
-    surface.add_quads(sheet_quads(edges), SkinMaterial.SKIN)
+def _add_web_margin(surface: Surface, rows: tuple[Indices, Indices]) -> None:
+    """Faces between the last rows (arms, web + 1) of both sheets, from each arm to the next."""
+    surface.add_quads(sheet_quads(np.stack(rows, axis=1)), SkinMaterial.SKIN)
 
 
 def _add_arms(
@@ -119,8 +128,11 @@ def _add_arms(
     layout: ArmLayout,
     upper: tuple[Sheet, Indices],
     lower: tuple[Sheet, Indices],
-) -> None:
-    """Tubes from the web to the tips, and the strips with suckers from the mouth to the tips."""
+) -> Indices:
+    """Tubes from the arms' roots to the tips, and the strips with suckers from the mouth to there.
+
+    Returns the tubes' vertices (arms, rows, ring), from the sheets' last row on.
+    """
     shape = layout.shape
     dorsal, ventral = layout.columns.dorsal, layout.columns.ventral
     distance = layout.stations[layout.web_row + 1 :]
@@ -135,8 +147,11 @@ def _add_arms(
     tube = np.concatenate([start, vertices], axis=1)
     faces = sheet_quads(closed(tube))
     first, last = dorsal + 1, dorsal + 1 + ventral
-    surface.add_quads(faces[:, :, :first], SkinMaterial.SKIN)
-    surface.add_quads(faces[:, :, last:], SkinMaterial.SKIN)
+    # Where the web is, it takes the place of the arms' sides.
+    wanted = np.ones(faces.shape[:-1], dtype=bool)
+    wanted[:, : layout.web_rows, [dorsal, -1]] = False
+    surface.add_quads(faces[:, :, :first][wanted[:, :, :first]], SkinMaterial.SKIN)
+    surface.add_quads(faces[:, :, last:][wanted[:, :, last:]], SkinMaterial.SKIN)
 
     sheet, below = lower
     under = _across_arms(sheet, below[ARMS_BELOW:])[..., ::-1]
@@ -153,6 +168,7 @@ def _add_arms(
         np.concatenate([sheet.distances[ARMS_BELOW:], distance]),
     )
     _add_tips(surface, layout, tube[:, -1], points[:, -1])
+    return tube
 
 
 def _across_arms(sheet: Sheet, rows: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from ..gait import diameters
 
 ARMS: Final = (1, 64)
 JOINTS: Final = (3, 200)
+WEB: Final = (0.0, 0.8)
 _SHORTEST_BONE: Final = 1e-5
 """In metres; Blender deletes bones a tenth as long."""
 
@@ -44,12 +45,16 @@ class OctopusShape:
     mesh_taper: float = 0.9
     """How much thinner still the skin gets towards the tip, in even steps along the arm:
     0 keeps to the diameters of the joints, 1 ends in a point."""
+    web: float = 1.0 / 3.0
+    """How far the web reaches along the arms, as a share of their length. Within what the arms'
+    roots share there is none of its own, nor with fewer than three arms."""
 
     def __post_init__(self) -> None:
         _check_range(phrase("Arms"), self.arms, *ARMS)
         _check_range(phrase("Joints per arm"), self.joints, *JOINTS)
         _check_range(phrase("Taper"), self.taper, 0.0, 1.0)
         _check_range(phrase("Mesh taper"), self.mesh_taper, 0.0, 1.0)
+        _check_range(phrase("Web reach"), self.web, *WEB)
         _check_size(phrase("Arm length"), self.arm_length)
         _check_size(phrase("First diameter"), self.first_diameter)
         shortest = float(np.min(self.segments))

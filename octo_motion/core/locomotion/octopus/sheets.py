@@ -33,6 +33,8 @@ _SLENDER: Final = 0.22
 _MOST_ROWS: Final = 240
 _FLAT_BELOW: Final = 0.85
 """Height of the lower half of an arm's outline against the upper."""
+_LEAST_WITH_WEB: Final = 3
+"""Arms; two stand too far apart for a web between them."""
 _TIP_POLAR: Final = np.radians([90.0, 50.0, 20.0])
 """Angles of the rings that round off the tip."""
 
@@ -86,9 +88,18 @@ class ArmLayout:
 
     @cached_property
     def web_row(self) -> int:
-        """The row at which the web ends."""
+        """The row at which the skin that the arms' roots share ends."""
         extent = min(0.22 * self.shape.arm_length, 2.4 * self.shape.first_diameter)
         return int(np.clip(np.searchsorted(self.stations, extent), 2, len(self.stations) - 4))
+
+    @cached_property
+    def web_rows(self) -> int:
+        """How many rows the web goes on from there."""
+        shape = self.shape
+        if shape.arms < _LEAST_WITH_WEB:
+            return 0
+        last = np.searchsorted(self.stations, shape.web * shape.arm_length)
+        return max(0, min(int(last), len(self.stations) - 4) - self.web_row)
 
     def section(self, distance: Floats, scale: Floats | float = 1.0) -> tuple[Floats, Floats]:
         """Outlines of the upper half (rows, dorsal + 1, 3) and of the lower (rows, ventral + 1, 3).
@@ -291,9 +302,7 @@ def _arms_and_web(layout: ArmLayout, distance: Floats, *, upper: bool) -> _Secto
     # Across the web from the arm's side (v = 0) to the middle (v = 1). Between arms that stand
     # far apart the web hangs back more, and hugs the arms.
     v = np.arange(1, columns.web // 2 + 1) / (columns.web // 2)
-    gap = math.degrees(2.0 * shape.half_sector)
-    depth = float(np.clip(0.5 * (45.0 / gap) ** 0.6, 0.1, 0.8))
-    power = float(np.clip(gap / 25.0, 1.8, 10.0))
+    depth, power = web_depth(shape), web_power(shape)
     side_angle, side_radius, side_height = angle[:, -1:], radius[:, -1:], height[:, -1:]
     web_angle = side_angle + (shape.half_sector - side_angle) * v
     base = shape.crown_radius + np.minimum(0.0, distance)[:, None]
@@ -312,6 +321,17 @@ def _arms_and_web(layout: ArmLayout, distance: Floats, *, upper: bool) -> _Secto
         with_web(radius, web_radius),
         with_web(height, web_height),
     )
+
+
+def web_depth(shape: OctopusShape) -> float:
+    """How far the web at the arms' roots reaches in its middle, of what it does at the arms."""
+    gap = math.degrees(2.0 * shape.half_sector)
+    return float(np.clip(0.5 * (45.0 / gap) ** 0.6, 0.1, 0.8))
+
+
+def web_power(shape: OctopusShape) -> float:
+    """How much the margin of that web hugs the arms."""
+    return float(np.clip(math.degrees(2.0 * shape.half_sector) / 25.0, 1.8, 10.0))
 
 
 def _even_ring(layout: ArmLayout, distance: Floats, sector: _Sector) -> _Sector:

@@ -231,6 +231,8 @@ class OctopusMesh:
     """(vertices, 4), index of a bone for each influence."""
     weights: Floats
     """(vertices, 4), strongest first, sum 1; zero where there are fewer influences."""
+    web: NDArray[np.bool_]
+    """(vertices,) whether it belongs to the web between the arms alone."""
 
 
 @dataclass
@@ -322,8 +324,11 @@ class Surface:
             outer = inner
         return outer
 
-    def mesh(self) -> OctopusMesh:
-        """All of it, without vertices that no face uses: holes were cut round them."""
+    def mesh(self, without_web: int) -> OctopusMesh:
+        """All of it, without vertices that no face uses: holes were cut round them.
+
+        Vertices from that number on are the web's.
+        """
         quads = np.concatenate(self._quads)
         used = np.zeros(self.count, dtype=bool)
         used[quads] = True
@@ -334,4 +339,5 @@ class Surface:
             materials=np.concatenate(self._materials),
             bones=np.concatenate(self._bones)[used],
             weights=np.concatenate(self._weights)[used],
+            web=np.arange(self.count)[used] >= without_web,
         )

@@ -20,7 +20,7 @@ from ....blender.scene import (
     suggested_control_points,
 )
 from ....core.errors import WriteError
-from ....core.locomotion.octopus import ARMS, JOINTS, OctopusShape
+from ....core.locomotion.octopus import ARMS, JOINTS, WEB, OctopusShape
 from ....core.locomotion.path import Route
 from ....core.phrases import phrase
 from ...language import reported
@@ -106,6 +106,24 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
         description="Add the skin too, weighted to the bones. Without it the armature comes alone",
         default=True,
     )
+    web: BoolProperty(
+        name="Web",
+        description=(
+            "Stretch a thin web between neighbouring arms, which opens and folds with them. "
+            "There is none with one or two arms"
+        ),
+        default=True,
+    )
+    web_reach: FloatProperty(
+        name="Web Reach",
+        description="How far the web reaches along the arms, as a share of their length",
+        subtype="FACTOR",
+        default=_DEFAULT.web,
+        min=WEB[0],
+        max=WEB[1],
+        soft_min=0.25,
+        soft_max=0.6,
+    )
 
     ready: BoolProperty(
         name="Ready to Move",
@@ -132,6 +150,10 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
         for name in (*_SHAPE, "with_mesh"):
             if name not in _LENGTHS or not self.size:
                 column.prop(self, name)
+        if self.with_mesh:
+            column.prop(self, "web")
+            if self.web:
+                column.prop(self, "web_reach")
         column = layout.column()
         for name in _PLACE:
             column.prop(self, name)
@@ -141,7 +163,10 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
         return "" if context.mode == "OBJECT" else "Switch to object mode first"
 
     def run(self, context: bpy.types.Context) -> None:
-        shape = OctopusShape(**{name: getattr(self, name) for name in _SHAPE})
+        shape = OctopusShape(
+            **{name: getattr(self, name) for name in _SHAPE},
+            web=self.web_reach if self.web else 0.0,
+        )
         if self.size:
             shape = shape.of_arm_length(self.size)
         place = self._place(context)
