@@ -379,7 +379,7 @@ def test_ranges_of_the_octopus_are_the_operators_own() -> None:
 
     properties: Any = bpy.ops.octo_motion.add_octopus.get_rna_type().properties
     table = rows(section("### Octopus"))
-    for name in ("arms", "joints", "arm_length", "first_diameter", "taper"):
+    for name in ("arms", "joints", "arm_length", "first_diameter", "taper", "web_reach"):
         definition = properties[name]
         least, most = definition.hard_min, definition.hard_max
         expected = f"{least:.6g} or more" if most > 2e9 else f"{least:g} to {most:g}"
