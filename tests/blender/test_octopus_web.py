@@ -131,7 +131,7 @@ def test_it_goes_through_gltf_and_bends_there_as_here(tmp_path: Path, shape: Oct
     for number, point in enumerate(there.tolist()):
         tree.insert(point, number)
     tree.balance()
-    away = [tree.find(point)[2] for point in here.tolist()]
+    away = [cast("float", tree.find(point)[2]) for point in here.tolist()]
     # 1.8e-7 of an arm.
     assert max(away) < 4e-7 * shape.arm_length
 
@@ -155,5 +155,5 @@ def posed(armature: Any) -> Any:
         for each in bpy.data.objects
         if each.type == "MESH" and each.find_armature() == armature
     )
-    shown = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    shown: Any = skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
     return np.array([shown.matrix_world @ vertex.co for vertex in shown.data.vertices])

@@ -82,9 +82,9 @@ def _partners(skin: Skin, upper: Integers, lower: Integers) -> Integers:
     above, below = (np.unique(each[skin.web[each]]) for each in (upper, lower))
     tree = KDTree(len(below))
     for number in below.tolist():
-        tree.insert(skin.rest[number], number)
+        tree.insert(skin.rest[number].tolist(), number)
     tree.balance()
     partner = np.full(len(skin.web), -1)
     for number in above.tolist():
-        partner[number] = tree.find(skin.rest[number])[1]
+        partner[number] = tree.find(skin.rest[number].tolist())[1]
     return partner

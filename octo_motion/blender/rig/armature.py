@@ -555,7 +555,7 @@ def vertex_positions(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
 
 def limb_skin(mesh: bpy.types.Mesh) -> NDArray[np.int64]:
     """Vertices (n,) of a mesh that tell how thick limbs are: all but a web between them."""
-    web = mesh.attributes.get(WEB_ATTRIBUTE)
+    web: Any = mesh.attributes.get(WEB_ATTRIBUTE)
     if (
         not isinstance(web, bpy.types.BoolAttribute)
         or web.domain != "POINT"
