@@ -159,13 +159,13 @@ def pairs_of(chains: Sequence[Capsules], moving: int) -> tuple[np.ndarray, np.nd
 
 
 def near(
-    parts: Parts, one: np.ndarray, other: np.ndarray, margin: float = 0.0
+    parts: Parts, one: np.ndarray, other: np.ndarray, margin: float = 0.0, slack: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Numbers of frames and of pairs whose bounding spheres touch, and how far apart their middle
     lines are at least.
 
     Of capsules ``one`` (pairs,) and ``other`` (pairs,), those count that are no further apart than
-    a margin in radii.
+    a margin in radii, and a slack in the unit of the joints.
     """
     if len(one) == 0:
         none = np.zeros(0, dtype=np.intp)
@@ -181,7 +181,7 @@ def near(
     squares = np.einsum("fsi,fsi->fs", middles, middles)
     rounding = 1e-6 * squares.max()
     apart = longest[one] + longest[other]
-    size = longest + (1.0 + margin) * np.maximum(*parts.radii)
+    size = longest + (1.0 + margin) * np.maximum(*parts.radii) + 0.5 * slack
     limit = np.full((len(longest), len(longest)), -np.inf, dtype=np.float32)
     limit[one, other] = ((size[one] + size[other]) * (1.0 + _ROUNDED)) ** 2 + rounding
     place = np.full(limit.shape, -1)
@@ -317,6 +317,8 @@ NEAR: Final = 1.0
 """Sums of radii between arms up to which one may be on the wrong side of the other."""
 _BESIDE: Final = 0.4
 """How much less that is where it is on the right side."""
+_SLACK: Final = 0.5
+"""Mean radii by which what is near may come nearer before it is looked at anew."""
 _TINY: Final = 1e-12
 
 
@@ -383,24 +385,20 @@ class Touches:
 
 class Touching:
     """The capsules of arms and of parts of the body, one frame each, that are so near to each other
-    that they may ever touch, at all frames.
+    that they touch, or may have to make way, at all frames.
+
+    Which these are is looked up once and holds for a while (Verlet, Physical Review 159, 1967, 98):
+    with some slack for those that move, and anew at frames at which a joint has moved by half of
+    that. So what an arm comes near to as it makes way counts as what it was near to before.
     """
 
     def __init__(self, crowd: Crowd, still: Sequence[Capsules]) -> None:
         frames, arms, joints, _ = crowd.joints.shape
-        chains = [
-            Capsules("", crowd.joints[:, arm], crowd.radii[arm], crowd.at_rest[arm])
-            for arm in range(arms)
-        ]
-        body = [
-            Capsules("", np.broadcast_to(each.joints, (frames, *each.joints.shape[1:])), *rest)
-            for each, rest in ((each, (each.radii, each.at_rest)) for each in still)
-        ]
-        parts = parts_of([*chains, *body])
-        self._crowd, self._parts = crowd, parts
+        self._crowd, self._still = crowd, still
         self._arms, self._joints = arms, joints
+        parts = self._parts(crowd.joints)
         self._radii, self._owner = parts.radii, parts.owner
-        places = _places(crowd, len(body))
+        places = _places(crowd, len(still))
         self._sides = _sides(places)
         self._apart: Floats | None = None
         if crowd.opened is not None:
@@ -410,17 +408,36 @@ class Touching:
         own = arms * (joints - 1)
         # Points of the body after those of all arms: where a capsule starts and, next, ends.
         self._body = np.stack([parts.starts[:, 0, own:], parts.ends[:, 0, own:]], axis=2)
-        one, other = pairs_of([*chains, *body], arms)
-        frame, pair, self._least = near(parts, one, other, NEAR)
-        self._frame, self._one, self._other = frame, one[pair], other[pair]
-        widest = np.maximum(*parts.radii)
-        self._wide = (widest[one] + widest[other])[pair]
+        self._pairs = pairs_of([*self._chains(crowd.joints[:1]), *still], arms)
+        self._slack = _SLACK * float(crowd.radii.mean())
+        self._seen_at = crowd.joints
+        self._watched = np.zeros(frames, dtype=bool)
+        frame, pair, _ = near(parts, *self._pairs)
+        self._rows = frame, self._pairs[0][pair], self._pairs[1][pair]
+
+    def _chains(self, joints: Floats) -> list[Capsules]:
+        crowd = self._crowd
+        return [
+            Capsules("", joints[:, arm], crowd.radii[arm], crowd.at_rest[arm])
+            for arm in range(self._arms)
+        ]
+
+    def _parts(self, joints: Floats) -> Parts:
+        """The capsules of arms with joints (frames, arms, joints, 3), and of the body."""
+        body = [
+            Capsules(
+                "",
+                np.broadcast_to(each.joints, (len(joints), *each.joints.shape[1:])),
+                each.radii,
+                each.at_rest,
+            )
+            for each in self._still
+        ]
+        return parts_of([*self._chains(joints), *body])
 
     def now(self) -> Touches:
         """What touches while nobody has made way yet."""
-        chosen = np.flatnonzero(self._least <= self._wide)
-        rows = self._frame[chosen], self._one[chosen], self._other[chosen]
-        return self._at(self._crowd.joints, *rows)
+        return self._at(self._crowd.joints, *self._rows)
 
     def look_at(self, frames: np.ndarray, without: np.ndarray) -> None:
         """Look from now on only at what is near enough for arms that make way, in frames (frames,)
@@ -428,27 +445,55 @@ class Touching:
 
         Some pairs (``Touches.pair``) are left as they are.
         """
-        chosen = frames[self._frame]
-        if len(without):
-            chosen &= ~np.isin(self._one * len(self._owner) + self._other, without)
-        # On its own side an arm has less far to be looked for.
-        far = np.flatnonzero(chosen & (self._least > (1.0 + _BESIDE * NEAR) * self._wide))
-        chosen[far] = self._may_be_wrong(self._frame[far], self._one[far], self._other[far])
-        rows = np.flatnonzero(chosen)
-        frame, one, other = self._frame[rows], self._one[rows], self._other[rows]
-        seen = self._at(self._crowd.joints, frame, one, other)
-        wrong = dot(seen.gap, seen.side) < 0.0
-        kept = seen.distance <= (1.0 + np.where(wrong, NEAR, _BESIDE * NEAR)) * seen.wide
-        self._frame, self._one, self._other = frame[kept], one[kept], other[kept]
+        one, other = self._pairs
+        kept = ~np.isin(one * len(self._owner) + other, without)
+        self._pairs = one[kept], other[kept]
+        self._watched, self._seen_at = frames, self._crowd.joints.copy()
+        self._rows = self._near(np.flatnonzero(frames))
 
-    def _may_be_wrong(self, frame: np.ndarray, one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    def _near(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Frame, the one and the other of what is near at some frames, where joints were seen."""
+        parts = self._parts(self._seen_at[frames])
+        place, pair, least = near(parts, *self._pairs, NEAR, self._slack)
+        rows = frames[place], self._pairs[0][pair], self._pairs[1][pair]
+        widest = np.maximum(*self._radii)
+        wide = widest[rows[1]] + widest[rows[2]]
+        # On its own side an arm has less far to be looked for.
+        chosen = np.ones(len(place), dtype=bool)
+        far = np.flatnonzero(least > (1.0 + _BESIDE * NEAR) * wide + self._slack)
+        chosen[far] = self._may_be_wrong(parts, place[far], *(each[far] for each in rows))
+        rows = rows[0][chosen], rows[1][chosen], rows[2][chosen]
+        seen = self._at(self._seen_at, *rows)
+        wrong = dot(seen.gap, seen.side) < self._slack
+        reach = (1.0 + np.where(wrong, NEAR, _BESIDE * NEAR)) * seen.wide + self._slack
+        kept = seen.distance <= reach
+        return rows[0][kept], rows[1][kept], rows[2][kept]
+
+    def _may_be_wrong(
+        self, parts: Parts, place: np.ndarray, frame: np.ndarray, one: np.ndarray, other: np.ndarray
+    ) -> np.ndarray:
         """Which may be on the wrong side of each other, told from where their middles are."""
-        starts, ends = self._parts.starts, self._parts.ends
+        starts, ends = parts.starts, parts.ends
         middles, steps = (0.5 * (starts + ends)).reshape(3, -1), ends - starts
         half = 0.5 * np.sqrt(dot(*[np.moveaxis(steps, 0, -2)] * 2)).ravel()
-        first, second = frame * len(self._owner) + one, frame * len(self._owner) + other
+        first, second = place * len(self._owner) + one, place * len(self._owner) + other
         apart = middles.take(first, axis=1) - middles.take(second, axis=1)
-        return dot(apart, self._side(frame, one, other)) <= half[first] + half[second]
+        reach = half[first] + half[second] + self._slack
+        return dot(apart, self._side(frame, one, other)) <= reach
+
+    def _look_again(self, joints: Floats) -> None:
+        """Look anew at frames at which joints (frames, arms, joints, 3) have moved too far."""
+        moved = joints - self._seen_at
+        squares = np.einsum("fajc,fajc->faj", moved, moved).max(axis=(1, 2))
+        anew = self._watched & (squares > (0.5 * self._slack) ** 2)
+        if not anew.any():
+            return
+        self._seen_at[anew] = joints[anew]
+        kept = ~anew[self._rows[0]]
+        fresh = self._near(np.flatnonzero(anew))
+        self._rows = tuple(
+            np.concatenate([old[kept], new]) for old, new in zip(self._rows, fresh, strict=True)
+        )
 
     def _side(self, frame: np.ndarray, one: np.ndarray, other: np.ndarray) -> Floats:
         """On which side (3, capsules) of others some belong at a frame."""
@@ -462,7 +507,8 @@ class Touching:
 
     def at(self, joints: Floats) -> Touches:
         """What is near to what, for joints (frames, arms, joints, 3)."""
-        return self._at(joints, self._frame, self._one, self._other)
+        self._look_again(joints)
+        return self._at(joints, *self._rows)
 
     def _at(self, joints: Floats, frame: np.ndarray, one: np.ndarray, other: np.ndarray) -> Touches:
         """The same of some capsules."""

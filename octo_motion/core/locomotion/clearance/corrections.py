@@ -93,6 +93,7 @@ def separate_arms(
     ground: Ground | None,
     scale: float,
     frames_per_cycle: float,
+    rate: float,
     opened: Opened | None = None,
     cyclic: bool = False,
 ) -> Floats | None:
@@ -108,6 +109,7 @@ def separate_arms(
         ground: what they walk on, if anything.
         scale: metres of the armature's unit.
         frames_per_cycle: of the gait: the shorter, the quicker arms make way.
+        rate: frames per second.
         opened: where arms stand round a body that swims as it lies, none for others.
         cyclic: whether the last frame is the first again.
     """
@@ -119,6 +121,7 @@ def separate_arms(
         volume.still,
         floor=_floor(travel, ground, scale),
         width=width_of(frames_per_cycle),
+        rate=rate,
         cyclic=cyclic,
     )
     return crowd.turned(rotations, moved)

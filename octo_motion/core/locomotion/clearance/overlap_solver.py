@@ -117,10 +117,10 @@ _HOPELESS: Final = (0.5, 1.0)
 """Depths, as shares of the thinner radius, between which arms are left in each other."""
 _MOSTLY: Final = 0.5
 """Share of all frames from which on two capsules that overlap belong together."""
-_SWIFT: Final = 1.2
-"""How much faster than anything before an arm may turn to make way …"""
-_UNSEEN: Final = 0.4
-"""… or radians from one frame to the next, if that is more: a walk has as much."""
+_UNSEEN: Final = 0.4 * 24.0
+"""Radians a second that an arm may turn to make way, or as fast as anything did before: a walk has
+as much. A fifth faster than before, arms that hold on for long turn by 20° in a 48th of a second
+instead of 13°."""
 _REPEATS: Final = 3
 """How often arms that could not make way well are looked for."""
 _LITTLE: Final = 0.02
@@ -141,14 +141,15 @@ def parted(
     *,
     floor: Floor | None,
     width: int,
+    rate: float,
     cyclic: bool = False,
 ) -> Floats | None:
     """Joints (frames, arms, joints, 3) of arms that have made way; none if nobody has to.
 
     The result at a frame hangs on the frames within some reach of it, and on no state: the same
     motion gives the same result. Parts of the body that are ``still`` have one frame each;
-    ``width`` is that of the means over frames that make it smooth (``smoothing.blurred``); cyclic,
-    the last frame is the first again.
+    ``width`` is that of the means over frames that make it smooth (``smoothing.blurred``), of which
+    there are ``rate`` to a second; cyclic, the last frame is the first again.
     """
     every = np.arange(len(crowd.joints))
     if not len(every):
@@ -166,7 +167,12 @@ def parted(
     # Who makes way may be in the way of others then, but not for ever.
     around = widened(deep, _AROUND * blur_reach(width), cyclic=cyclic) > 0.0
     touching.look_at(around, own_form)
-    return _Parting(crowd, touching, np.flatnonzero(around), floor, width, cyclic=cyclic).run()
+    return _Parting(
+        *(crowd, touching, np.flatnonzero(around), floor),
+        width=width,
+        unseen=_UNSEEN / rate,
+        cyclic=cyclic,
+    ).run()
 
 
 class _Parting:
@@ -178,12 +184,13 @@ class _Parting:
         touching: Touching,
         around: np.ndarray,
         floor: Floor | None,
-        width: int,
         *,
+        width: int,
+        unseen: float,
         cyclic: bool,
     ) -> None:
         self._crowd, self._touching, self._floor = crowd, touching, floor
-        self._around = around
+        self._around, self._unseen = around, unseen
         self._width, self._cyclic = width, cyclic
         self._joints = crowd.joints.copy()
         steps = np.diff(crowd.joints, axis=2)
@@ -396,7 +403,7 @@ class _Parting:
         low, high = _HOPELESS
         result = smooth_step((worst[:, :arms] - low) / (high - low))
         changed = self._changed()
-        most = max(_SWIFT * float(self._turns_before.max(initial=0.0)), _UNSEEN)
+        most = max(float(self._turns_before.max(initial=0.0)), self._unseen)
         swift = self._turns_before > most
         # Between two frames of which neither has changed it turns as it did.
         anew = np.nonzero(changed[:-1] | changed[1:])

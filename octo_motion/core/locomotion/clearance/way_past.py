@@ -70,6 +70,7 @@ def led_past(
     if not len(items[0]):
         return None
     touching = Touching(crowd, still)
+    touching.look_at((passing.share > 0.0).any(axis=1), np.zeros(0, dtype=np.intp))
     rod = _Rods.of(crowd, passing, items)
     joints, moved = crowd.joints.copy(), False
     for _ in range(_ROUNDS):

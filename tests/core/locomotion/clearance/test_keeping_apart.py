@@ -75,6 +75,7 @@ def apart(bulk: BodyVolume, rotations: Floats) -> Floats | None:
         ground=None,
         scale=1.0,
         frames_per_cycle=48.0,
+        rate=24.0,
     )
 
 
