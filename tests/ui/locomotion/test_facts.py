@@ -2,8 +2,8 @@
 """What is known of octopuses, held against what Blender plays.
 
 Levy, Flash and Hochner, Current Biology 25 (2015): a crawl goes any way, whichever way the body
-faces, and pushes by lengthening arms that lead away from where it goes. Kazakidi, Tsakiris and
-Ekaterinaris (2012 on): arms that scull open slowly and close fast.
+faces, pushes by lengthening arms that lead away from where it goes, and has no rhythm between its
+arms. Kazakidi, Tsakiris and Ekaterinaris (2012 on): arms that scull open slowly and close fast.
 """
 
 from typing import Any
@@ -76,6 +76,42 @@ def test_arms_that_hold_on_get_longer_before_they_let_go(octopus: Any) -> None:
     # From where it is shortest in its hold to where it is longest after that.
     assert len(longer) > 10
     assert np.median(longer) > 0.02
+
+
+def rhythm(octopus: Any, setup: str) -> float:
+    """How fixed the moments are at which arms let go against one another, 0 … 1.
+
+    Each moment at which an arm lets go is an angle in the time from one of another arm's to the
+    next; of all of a pair it is the length of their mean direction, and of all pairs the mean.
+    """
+    bpy.ops.octo_motion.setup_load(name=setup)
+    settings = octopus.octo_motion.locomotion
+    if settings.route is None:
+        bpy.ops.octo_motion.add_route(**STRAIGHT)
+        bpy.context.view_layer.objects.active = octopus
+    shot = prepare(octopus, bpy.context)
+    for _ in shot.compute():
+        pass
+    result = shot.shot.result
+    assert result is not None
+    held = [lying.any(axis=1).astype(int) for lying in result.arms.in_contact]
+    lets_go = [np.flatnonzero(np.diff(each) == -1) for each in held]
+    fixed = []
+    for one in lets_go:
+        for other in lets_go:
+            between = other[(other > one[0]) & (other < one[-1])] if len(one) > 1 else other[:0]
+            if one is other or len(between) < 4:
+                continue
+            before = np.searchsorted(one, between, side="right") - 1
+            share = (between - one[before]) / np.diff(one)[before]
+            fixed.append(np.abs(np.exp(2j * np.pi * share).mean()))
+    assert len(fixed) > 10
+    return float(np.mean(fixed))
+
+
+def test_a_crawl_has_no_rhythm_between_its_arms_and_a_walk_has_one(octopus: Any) -> None:
+    assert rhythm(octopus, "walk") > 0.9  # 0.996
+    assert rhythm(octopus, "crawl") < 0.6  # 0.35
 
 
 @pytest.mark.parametrize("setup", ["swim", "jet_escape"])
