@@ -119,7 +119,8 @@ def setup_by_picture(hand: Hand, figures: Figures) -> Steps:
     yield from hand.move(*generate)
     yield from hand.click()
     yield from hand.until(lambda: action_of(octopus()).frame_range[1] != before, "Another motion")
-    bpy.context.scene.frame_set(40)
+    # Soon enough that what swims fast is still in sight.
+    bpy.context.scene.frame_set(10)
     yield from hand.take("setup_2_generated")
     figures |= {"from": chosen, "to": after, "clicks": hand.clicks - clicks}
 
