@@ -52,15 +52,21 @@ def test_a_crawl_goes_its_way_whichever_way_it_faces(octopus: Any) -> None:
         assert np.abs(apart).max() < 0.02  # m, on a way of 4 m
 
 
-def test_arms_that_hold_on_get_longer_before_they_let_go(octopus: Any) -> None:
-    bpy.ops.octo_motion.setup_load(name="crawl")
-    bpy.ops.octo_motion.add_route(**STRAIGHT)
-    bpy.context.view_layer.objects.active = octopus
+def computed(octopus: Any, setup: str) -> Any:
+    """A set-up's motion along the straight route, before it is written."""
+    bpy.ops.octo_motion.setup_load(name=setup)
+    if octopus.octo_motion.locomotion.route is None:
+        bpy.ops.octo_motion.add_route(**STRAIGHT)
+        bpy.context.view_layer.objects.active = octopus
     shot = prepare(octopus, bpy.context)
     for _ in shot.compute():
         pass
-    result = shot.shot.result
-    assert result is not None
+    assert shot.shot.result is not None
+    return shot.shot.result
+
+
+def test_arms_that_hold_on_get_longer_before_they_let_go(octopus: Any) -> None:
+    result = computed(octopus, "crawl")
     starts = np.cumsum([0] + [len(each) for each in result.plan.job.creature.bones])
     longer = []
     for arm, lying in enumerate(result.arms.in_contact):
@@ -84,17 +90,8 @@ def rhythm(octopus: Any, setup: str) -> float:
     Each moment at which an arm lets go is an angle in the time from one of another arm's to the
     next; of all of a pair it is the length of their mean direction, and of all pairs the mean.
     """
-    bpy.ops.octo_motion.setup_load(name=setup)
-    settings = octopus.octo_motion.locomotion
-    if settings.route is None:
-        bpy.ops.octo_motion.add_route(**STRAIGHT)
-        bpy.context.view_layer.objects.active = octopus
-    shot = prepare(octopus, bpy.context)
-    for _ in shot.compute():
-        pass
-    result = shot.shot.result
-    assert result is not None
-    held = [lying.any(axis=1).astype(int) for lying in result.arms.in_contact]
+    in_contact = computed(octopus, setup).arms.in_contact
+    held = [lying.any(axis=1).astype(int) for lying in in_contact]
     lets_go = [np.flatnonzero(np.diff(each) == -1) for each in held]
     fixed = []
     for one in lets_go:
