@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Final
 
@@ -639,12 +640,7 @@ def _volume(ends: Floats, radius: float) -> float:
 
 def skin_key(armature: bpy.types.Object) -> bytes:
     """What the radii hang on, as far as it can be read at once: not which bones points follow."""
-    return content_key(
-        [
-            (tuple(group.name for group in item.vertex_groups), points)
-            for item, points, _ in _meshes(armature)
-        ]
-    )
+    return content_key([(each.groups, _seen(each)) for each in _surfaces(armature)])
 
 
 def _of_chain(
@@ -670,21 +666,162 @@ def _of_chain(
     return np.minimum.accumulate(result)
 
 
-def _meshes(
-    armature: bpy.types.Object,
-) -> Iterator[tuple[bpy.types.Object, Floats, NDArray[np.int64]]]:
-    """Meshes that the armature deforms, points of theirs, and which vertices these are."""
-    inverse = np.array(armature.matrix_world.inverted_safe(), dtype=np.float64)
-    for item in deformed_meshes(armature):
-        mesh = item.data
-        assert isinstance(mesh, bpy.types.Mesh)
+@dataclass(frozen=True, eq=False)
+class _Surface:
+    """A mesh that an armature moves, as it is at rest: limbs alone, webs left out."""
+
+    points: NDArray[np.float32]
+    """(n, 3) in the mesh's own space."""
+    matrix: Floats
+    """(4, 4) from there to the armature's."""
+    groups: tuple[str, ...]
+    """What each point can follow …"""
+    leading: Callable[[], NDArray[np.int64]]
+    """… and which of these each ``step``-th point follows most (some,), none by -1."""
+    step: int
+    """Of more points than are looked at, only every second, third … is."""
+
+
+_SHAPING: Final = frozenset({"MIRROR", "MULTIRES", "SKIN", "SOLIDIFY", "SUBSURF"})
+"""Modifiers that make of a mesh the surface which is seen, whatever moves it: of half a creature a
+whole one, of a cage of few points the skin inside of it."""
+
+_shaped: Final[ContentCache[NDArray[np.float32]]] = ContentCache(8)
+
+
+def carrying_bone(item: bpy.types.Object, armature: bpy.types.Object) -> str | None:
+    """The bone on which a stiff part hangs, itself or by its parents."""
+    each: bpy.types.Object | None = item
+    while each is not None:
+        if each.parent == armature:
+            known = each.parent_type == "BONE" and each.parent_bone in armature_data(armature).bones
+            return each.parent_bone if known else None
+        each = each.parent
+    return None
+
+
+def _surfaces(armature: bpy.types.Object) -> Iterator[_Surface]:
+    """All that shows how thick an armature's limbs are: skins, and stiff parts hung on bones."""
+    inverse = np.linalg.inv(np.array(armature.matrix_world, dtype=np.float64))
+    bones = armature_data(armature).bones
+    for item in bpy.data.objects:
+        if item.type != "MESH":
+            continue
+        if item.find_armature() == armature:
+            matrix = inverse @ np.array(item.matrix_world, dtype=np.float64)
+            yield _surface(item, matrix, tuple(group.name for group in item.vertex_groups), bones)
+        elif not item.hide_render and (carrier := carrying_bone(item, armature)) is not None:
+            made = _surface(item, _hung_at_rest(item, bones[carrier]), (carrier,), bones)
+            count = len(made.points[:: made.step])
+            yield replace(made, leading=lambda count=count: np.zeros(count, dtype=np.int64))
+
+
+def _hung_at_rest(item: bpy.types.Object, bone: bpy.types.Bone) -> Floats:
+    """From a stiff part's space to its armature's (4, 4) with that at rest, however it is posed."""
+    matrix, each = Matrix(), item
+    while True:
+        matrix = each.matrix_parent_inverse @ each.matrix_basis @ matrix
+        if each.parent is None or each.parent_type == "BONE":
+            break
+        each = each.parent
+    if not bone.use_relative_parent:
+        matrix = bone.matrix_local @ Matrix.Translation((0.0, bone.length, 0.0)) @ matrix
+    return np.array(matrix, dtype=np.float64)
+
+
+def _surface(
+    item: bpy.types.Object, matrix: Floats, groups: tuple[str, ...], bones: bpy.types.ArmatureBones
+) -> _Surface:
+    mesh = item.data
+    assert isinstance(mesh, bpy.types.Mesh)
+    own = [each for each in item.modifiers if each.type in _SHAPING and each.show_viewport]
+    known = frozenset(number for number, name in enumerate(groups) if name in bones)
+    if own and len(mesh.vertices) and item.mode == "OBJECT":
+        corners = np.empty(len(mesh.loops), dtype=np.int32)
+        mesh.loops.foreach_get("vertex_index", corners)
+        settings = [_settings_of(each, item) for each in own]
+        key = content_key(vertex_positions(mesh), limb_skin(mesh), corners, settings)
+        points = _shaped.get(key, lambda: _with_modifiers(item)[0])
+        return _Surface(
+            points, matrix, groups, lambda: _with_modifiers(item, known)[1], _step(points)
+        )
+    numbers = limb_skin(mesh)
+    points, step = vertex_positions(mesh)[numbers], _step(numbers)
+    return _Surface(points, matrix, groups, lambda: _leading(mesh, numbers[::step], known), step)
+
+
+def _step(points: NDArray[Any]) -> int:
+    return max(1, -(-len(points) // _MOST_VERTICES))
+
+
+def _settings_of(modifier: bpy.types.Modifier, item: bpy.types.Object) -> list[str]:
+    """All that a modifier's effect hangs on, but for the mesh."""
+    told = []
+    for each in modifier.bl_rna.properties:
+        value: Any = getattr(modifier, each.identifier, None)
+        if isinstance(value, bpy.types.Object):
+            near = np.array(item.matrix_world.inverted_safe() @ value.matrix_world)
+            value = value.name, (np.round(near / _ROUNDED) * _ROUNDED).tolist()
+        elif getattr(each, "is_array", False):
+            value = tuple(value)
+        elif isinstance(value, bpy.types.ID):
+            value = value.name
+        elif isinstance(value, bpy.types.bpy_struct):
+            continue
+        told.append(f"{each.identifier} {value}")
+    return told
+
+
+def _with_modifiers(
+    item: bpy.types.Object, groups: frozenset[int] = frozenset()
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """A skin's points (n, 3) as its modifiers make them while no bone bends it, and of some vertex
+    groups the one that each point which is looked at follows most.
+
+    A copy is shown in a scene of its own: the artist's scene, its pose and frame stay untouched.
+    """
+    copy: Any = item.copy()
+    scene: Any = bpy.data.scenes.new(item.name)
+    try:
+        copy.animation_data_clear()
+        copy.constraints.clear()
+        copy.parent = None
+        copy.matrix_world = item.matrix_world
+        for modifier in [each for each in copy.modifiers if each.type not in _SHAPING]:
+            copy.modifiers.remove(modifier)
+        scene.collection.objects.link(copy)
+        layer = scene.view_layers[0]
+        layer.update()
+        shown = copy.evaluated_get(layer.depsgraph)
+        mesh = shown.to_mesh(preserve_all_data_layers=True, depsgraph=layer.depsgraph)
         numbers = limb_skin(mesh)
-        numbers = numbers[:: max(1, -(-len(numbers) // _MOST_VERTICES))]
         points = vertex_positions(mesh)[numbers]
-        matrix = inverse @ np.array(item.matrix_world, dtype=np.float64)
-        # Wherever the armature has walked to, its skin is as thick.
-        matrix = np.round(matrix / _ROUNDED) * _ROUNDED
-        yield item, points @ matrix[:3, :3].T + matrix[:3, 3], numbers
+        leading = _leading(mesh, numbers[:: _step(points)], groups)
+        shown.to_mesh_clear()
+    finally:
+        bpy.data.objects.remove(copy)
+        bpy.data.scenes.remove(scene)
+    return points, leading
+
+
+def _leading(
+    mesh: bpy.types.Mesh, numbers: NDArray[np.int64], known: frozenset[int]
+) -> NDArray[np.int64]:
+    """Of some vertex groups the one that each of these vertices follows most, none by -1."""
+    found = np.full(len(numbers), -1)
+    vertices = mesh.vertices
+    for place, number in enumerate(numbers.tolist()):
+        groups = [each for each in vertices[number].groups if each.group in known]
+        if groups:
+            found[place] = max(groups, key=lambda each: each.weight).group
+    return found
+
+
+def _seen(surface: _Surface) -> Floats:
+    """Those points (some, 3) of a surface that are looked at, armature space."""
+    # Wherever the armature has walked to, its skin is as thick.
+    matrix = np.round(surface.matrix / _ROUNDED) * _ROUNDED
+    return surface.points[:: surface.step] @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def _followers(armature: bpy.types.Object) -> Iterator[tuple[str, Floats]]:
@@ -692,19 +829,10 @@ def _followers(armature: bpy.types.Object) -> Iterator[tuple[str, Floats]]:
 
     Groups of other names say nothing of bones: masks, pins of cloth.
     """
-    assert isinstance(armature.data, bpy.types.Armature)
-    bones = armature.data.bones
-    for item, moved, numbers in _meshes(armature):
-        assert isinstance(item.data, bpy.types.Mesh)
-        names = {group.index: group.name for group in item.vertex_groups if group.name in bones}
-        owner = np.full(len(moved), -1)
-        vertices = item.data.vertices
-        for place, number in enumerate(numbers.tolist()):
-            groups = [each for each in vertices[number].groups if each.group in names]
-            if groups:
-                owner[place] = max(groups, key=lambda each: each.weight).group
-        for group in np.unique(owner[owner >= 0]).tolist():
-            yield names[group], moved[owner == group]
+    for surface in _surfaces(armature):
+        moved, leading = _seen(surface), surface.leading()
+        for group in np.unique(leading[leading >= 0]).tolist():
+            yield surface.groups[group], moved[leading == group]
 
 
 def arm_skins(
@@ -741,17 +869,13 @@ def _arm_skins(points: Floats, joints: Sequence[Floats], frames: Sequence[Floats
 
 def _skin(armature: bpy.types.Object, size: float) -> Floats:
     """Some points (n, 3) of meshes that an armature of a size moves, at rest, armature space."""
-    inverse = np.linalg.inv(np.array(armature.matrix_world, dtype=np.float64))
     found: list[tuple[np.ndarray, Floats]] = []
-    for item in deformed_meshes(armature):
-        mesh = item.data
-        assert isinstance(mesh, bpy.types.Mesh)
-        points = vertex_positions(mesh)[limb_skin(mesh)]
-        place = inverse @ np.array(item.matrix_world, dtype=np.float64)
+    for surface in _surfaces(armature):
+        place = surface.matrix.copy()
         # Wherever the armature has walked to, its skin is as thick.
         place[:3, :3] = np.round(place[:3, :3] / _PLACED_TO) * _PLACED_TO
         place[:3, 3] = np.round(place[:3, 3] / (_PLACED_TO * size)) * (_PLACED_TO * size)
-        found.append((points, place))
+        found.append((surface.points, place))
     step = max(1, sum(len(points) for points, _ in found) // _MOST_POINTS)
     parts, passed = [np.empty((0, 3))], 0
     for points, place in found:

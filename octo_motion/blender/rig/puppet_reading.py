@@ -36,6 +36,7 @@ from ...core.rotations import Floats, from_matrix
 from ...core.skeleton import Skeleton
 from .armature import (
     armature_data,
+    carrying_bone,
     driven_channels,
     even_scale,
     limb_skin,
@@ -500,7 +501,7 @@ def _read_skin(armature: bpy.types.Object, skeleton: Skeleton) -> _Skin:
         shown = item.evaluated_get(depsgraph)
         if not isinstance(shown.data, bpy.types.Mesh) or not len(shown.data.vertices):
             continue
-        carrier = _carrying_bone(item, armature)
+        carrier = carrying_bone(item, armature)
         if carrier is not None:
             place = _vertices(shown)
             step = -(-len(place) // _MOST_VERTICES)
@@ -531,17 +532,6 @@ def is_part_of(item: bpy.types.Object, armature: bpy.types.Object) -> bool:
             return True
         above = above.parent
     return False
-
-
-def _carrying_bone(item: bpy.types.Object, armature: bpy.types.Object) -> str | None:
-    """The bone on which a stiff part hangs, itself or by its parents."""
-    each: bpy.types.Object | None = item
-    while each is not None:
-        if each.parent == armature:
-            known = each.parent_type == "BONE" and each.parent_bone in armature_data(armature).bones
-            return each.parent_bone if known else None
-        each = each.parent
-    return None
 
 
 def _vertices(shown: bpy.types.Object) -> Floats:
