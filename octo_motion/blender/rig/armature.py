@@ -186,9 +186,13 @@ def even_scale(armature: bpy.types.Object) -> float:
         )
     if sizes.max() - sizes.min() > _EVEN * sizes.max():
         shown = ", ".join(f"{size:.4g}" for size in sizes)
+        own = np.abs(np.array(armature.scale) * np.array(armature.delta_scale))
+        inherited = armature.parent is not None and np.ptp(own) <= _EVEN * own.max()
         raise RigError(
             phrase("{name} is scaled unequally ({shown}).", name=name, shown=shown),
-            "Apply its scale (Object > Apply > Scale).",
+            "Apply the parent's scale."
+            if inherited
+            else "Apply its scale (Object > Apply > Scale).",
         )
     axes = matrix / sizes
     if np.abs(axes.T @ axes - np.eye(3)).max() > _EVEN:

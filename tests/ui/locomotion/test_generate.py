@@ -662,6 +662,12 @@ def without_size(armature: Any) -> None:
     armature.scale = (0.0, 0.0, 0.0)
 
 
+def unequal_by_its_parent(armature: Any) -> None:
+    armature.parent = bpy.data.objects.new("Parent", None)
+    bpy.context.scene.collection.objects.link(armature.parent)
+    armature.parent.scale = (1.0, 2.0, 1.0)
+
+
 def sheared(armature: Any) -> None:
     parent = bpy.data.objects.new("Parent", None)
     bpy.context.scene.collection.objects.link(parent)
@@ -754,6 +760,7 @@ def tweaked(armature: Any) -> None:
     [
         (no_route, "'Octopus' has no route. Choose a curve"),
         (unequal, r"scaled unequally \(1, 2, 1\)"),
+        (unequal_by_its_parent, r"scaled unequally \(1, 2, 1\)\. Apply the parent's scale"),
         (mirrored, "mirrored"),
         (without_size, "has no size"),
         (sheared, "sheared by its parent"),

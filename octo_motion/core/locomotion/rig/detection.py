@@ -3,7 +3,8 @@
 
 1. Bones that move the mesh are looked at: those with the deform flag and a vertex group; without
    vertex groups the deform flag alone, without that all bones. They form a tree, other bones
-   between them skipped; chains are its branches that end in a tip.
+   between them skipped; chains are its branches that end in a tip, but for those that are named
+   after another part of a body.
 2. Arms are a family of such chains: alike in bones and length, long compared with the rest of the
    rig, springing from one place.
 3. Where constraints move those, the control bones at the same joints take their place.
@@ -12,6 +13,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -45,6 +47,15 @@ from .arm_chains import (
 REMEDY: Final = "Select the bones of one arm, root to tip, and click + beside the list."
 
 _TIP_MARKERS: Final = ("_end", ".end", "_nub", "nub", "_leaf", "_endsite")
+_NUMBERED: Final = re.compile(r"(.+)[._]\d+")
+_OTHER_PARTS: Final = frozenset(
+    {"antenna", "antennae", "beak", "ear", "ears", "eye", "eyes", "eyestalk", "fin", "fins"}
+    | {"funnel", "hair", "hat", "head", "hyponome", "jaw", "mantle", "mouth", "neck", "siphon"}
+    | {"spine", "syphon", "tail", "tongue", "web", "webbing"}
+)
+"""What bones of other parts of a body are called …"""
+_ARM_WORD: Final = re.compile(r"arm|feeler|leg|limb|tentac")
+"""… unless this is in their names, too: arms of the head."""
 _CONTROL_PREFIXES: Final = ("ORG-", "MCH-", "CTRL-", "CTRL_", "VIS-", "IK-", "IK_", "FK-", "FK_")
 
 
@@ -87,7 +98,8 @@ def candidate_chains(skeleton: Skeleton) -> tuple[BoneTree, list[BoneChain]]:
     deforming = {bone for bone in numbers if skeleton.deform[bone]}
     weighted = {bone for bone in deforming if skeleton.weighted[bone]}
     longest = 0
-    for members in (weighted, deforming - tips, set(numbers) - tips):
+    # Importers give vertex groups to all bones of a file, to these as well.
+    for members in (weighted - tips, weighted, deforming - tips, set(numbers) - tips):
         tree = _tree_of(skeleton, members)
         chains = _chains_of(skeleton, tree)
         usable = [chain for chain in chains if LEAST_BONES <= len(chain) <= MOST_BONES]
@@ -265,7 +277,42 @@ def _is_tip_marker(skeleton: Skeleton, bone: int) -> bool:
     if parent < 0 or skeleton.children[bone]:
         return False
     name, above = skeleton.names[bone].lower(), skeleton.names[parent].lower()
-    return name.endswith(_TIP_MARKERS) and name.startswith(above)
+    if name.endswith(_TIP_MARKERS):
+        return name.startswith(above)
+    # Some programs put a number behind all names.
+    bare, upper = (_NUMBERED.fullmatch(each) for each in (name, above))
+    return (
+        bare is not None
+        and upper is not None
+        and bare[1].endswith(_TIP_MARKERS)
+        and bare[1].startswith(upper[1])
+    )
+
+
+def without_other_parts(
+    skeleton: Skeleton, tree: BoneTree, chains: list[BoneChain]
+) -> tuple[BoneTree, list[BoneChain]]:
+    """A rig without the chains most of whose bones are named after a part of a body that is no arm.
+
+    A mantle that lies back is as long as the arms and springs from where they do; fins, stalks of
+    eyes and webs even come in pairs. Where no chain has another name, none is an arm.
+    """
+    others = [chain for chain in chains if _is_named_after_other_part(skeleton, chain)]
+    bones = {bone for chain in others for bone in chain.bones}
+    if not bones:
+        return tree, chains
+    left = _tree_of(skeleton, set(tree.members) - bones)
+    return left, [chain for chain in chains if bones.isdisjoint(chain.bones)]
+
+
+def _is_named_after_other_part(skeleton: Skeleton, chain: BoneChain) -> bool:
+    count = 0
+    for bone in chain.bones:
+        # Words apart: LeftEye_01 is left and eye.
+        name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", skeleton.names[bone]).lower()
+        words = set(re.findall(r"[a-z]+", name))
+        count += not words.isdisjoint(_OTHER_PARTS) and _ARM_WORD.search(name) is None
+    return 2 * count > len(chain)
 
 
 def _length(skeleton: Skeleton, bones: Sequence[int]) -> float:
@@ -504,7 +551,7 @@ def detect_arms(
     elif front is not None:
         body_rotation(up, front)  # raises where they lie on one axis
     tree, chains = candidate_chains(skeleton)
-    family = best_family(skeleton, tree, chains, up)
+    family = best_family(skeleton, *without_other_parts(skeleton, tree, chains), up)
     if len(family) > MOST_ARMS:
         raise RigError(
             phrase(

@@ -290,6 +290,75 @@ def test_bones_that_exporters_put_at_the_tips_are_not_in_the_arms() -> None:
     assert {len(arm.bones) for arm in detect(rig).arms} == {6}
 
 
+def test_such_bones_are_known_with_vertex_groups_and_numbers_of_the_file() -> None:
+    """Importers give vertex groups to all bones, some programs a number to all names."""
+    rig = octopus(bones=5, names="tentacle{arm}_{bone}_0{arm}", weighted=True)
+    for name, tail in list(zip(rig.names, rig.tails, strict=True)):
+        if "_4_" in name:
+            marker = name[:-3] + "_End_0" + name[-1]
+            rig.bone(marker, tail, tail + 0.3 * UP, name, weighted=True)
+    found = detect(rig)
+    assert len(found.arms) == 8
+    assert {len(arm.bones) for arm in found.arms} == {5}
+
+
+def test_an_arm_of_three_bones_keeps_the_one_that_is_called_its_end() -> None:
+    rig = octopus(bones=2, weighted=True)
+    for name, tail in list(zip(rig.names, rig.tails, strict=True)):
+        if name.endswith("_1"):
+            further = tail + (tail - rig.heads[rig.names.index(name)])
+            rig.bone(f"{name}_end", tail, further, name, weighted=True)
+    assert {len(arm.bones) for arm in detect(rig).arms} == {3}
+
+
+_MANTLE_UP = ((0, 0.3, 1.2), (0, 0.6, 3.2))
+_FIN_LEFT, _FIN_RIGHT = ((0.2, 0, 1.5), (1.5, 0, 2.5)), ((-0.2, 0, 1.5), (-1.5, 0, 2.5))
+
+
+@pytest.mark.parametrize(
+    ("parts", "parent"),
+    [
+        ({"mantle{}": ((0, 0.3, 1.2), (0, 2.2, 1.9))}, "body"),
+        ({"Mantle_{}": _MANTLE_UP, "Siphon_{}": ((0, 0, 1), (0, -1, 1))}, "body"),
+        ({"FinL{}": _FIN_LEFT, "FinR{}": _FIN_RIGHT}, "body"),
+        ({"eye.L.{}": _FIN_LEFT, "eye.R.{}": _FIN_RIGHT}, "body"),
+        ({"tail_{}": ((0, 0.3, 1), (0, 2.3, 1))}, "root"),
+    ],
+)
+def test_parts_of_a_body_that_are_as_long_as_arms_are_told_by_their_names(
+    parts: dict[str, tuple[Sequence[float], Sequence[float]]], parent: str
+) -> None:
+    rig = octopus(bones=3, weighted=True)
+    for name, (root, tip) in parts.items():
+        rig.chain([name.format(bone) for bone in range(3)], root, tip, parent, weighted=True)
+    found = detect(rig)
+    assert {arm.bones[0] for arm in found.arms} == {f"tentacle{arm}_0" for arm in range(8)}
+    assert found.root_bone == "root"
+
+
+def test_webs_between_arms_are_no_arms() -> None:
+    rig = octopus(bones=4, weighted=True)
+    for number, azimuth in enumerate(angles(8)):
+        way = outward(azimuth + 22.5)
+        bones = [f"web{number}_{bone}" for bone in range(3)]
+        rig.chain(bones, 0.3 * way + UP, 1.3 * way + UP, "body", weighted=True)
+    assert len(detect(rig).arms) == 8
+
+
+def test_arms_of_a_head_are_arms() -> None:
+    found = detect(octopus(names="head_arm_{arm}.{bone}"))
+    assert len(found.arms) == 8
+
+
+def test_a_snake_gets_a_clear_answer() -> None:
+    rig = Rig()
+    rig.bone("body", (0, 0, 0), (0, 0, 0.3))
+    rig.chain(["tail.01", "tail.02", "tail.03"], (0, 0.3, 0.2), (0, 2, 0.2), "body")
+    rig.chain(["neck.01", "neck.02", "head"], (0, -0.3, 0.2), (0, -1.5, 1), "body")
+    with pytest.raises(RigError, match="look like limbs of a body"):
+        detect(rig)
+
+
 def test_a_mantle_of_some_bones_is_no_arm() -> None:
     rig = octopus()
     rig.chain(["mantle1", "mantle2", "mantle3", "mantle4"], (0, 0, 1.5), (0, 0, 3), "body")
