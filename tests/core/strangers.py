@@ -78,7 +78,7 @@ _CARRIERS = {
     "toe": ("foot", "toe"),
 }
 
-Action = Literal["walk", "throw", "dance"]
+Action = Literal["walk", "throw", "dance", "balance"]
 
 
 def about(axis: str, degrees: Floats | float) -> Floats:
@@ -102,8 +102,9 @@ def local_turns(action: Action, frames: int) -> dict[str, Floats]:
     time = np.arange(frames) / RATE
     step = 2.0 * np.pi * time / 1.1
     wave, slow = np.sin(step), np.sin(2.0 * np.pi * time / 3.1)
-    throwing, dancing = action == "throw", action == "dance"
-    lean = {"walk": 4.0 + 0.0 * wave, "throw": 8.0 + 6.0 * slow, "dance": 6.0 + 14.0 * slow}[action]
+    throwing, dancing, balancing = (action == each for each in ("throw", "dance", "balance"))
+    leans = {"throw": 8.0 + 6.0 * slow, "dance": 6.0 + 14.0 * slow}
+    lean = leans.get(action, 4.0 + 0.0 * wave)
     twist = 6.0 * wave + (18.0 * slow if throwing or dancing else 0.0)
     made = {
         "pelvis": about("z", -5.0 * wave) @ about("x", 2.0 + 2.0 * np.cos(2.0 * step)),
@@ -128,6 +129,15 @@ def local_turns(action: Action, frames: int) -> dict[str, Floats]:
         made[f"shin.{side}"] = about("x", knee)
         made[f"foot.{side}"] = about("x", 4.0 - 0.5 * knee - 10.0 * swing)
         made[f"toe.{side}"] = about("x", -8.0 * (1.0 + swing))
+        if balancing and side == "L":
+            # It stands flat and is turned out.
+            above = made["pelvis"] @ made["thigh.L"] @ made["shin.L"]
+            made["foot.L"] = above.transpose(0, 2, 1) @ about("z", 35.0)
+        elif balancing:
+            # It never stands, and is stretched.
+            made["thigh.R"] = about("x", -15.0) @ made["thigh.R"]
+            made["shin.R"] = about("x", 40.0) @ made["shin.R"]
+            made["foot.R"] = about("x", 25.0) @ made["foot.R"]
     return made
 
 

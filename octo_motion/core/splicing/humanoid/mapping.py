@@ -216,6 +216,7 @@ def _left_by_feet(
 ) -> Floats | None:
     """The body's left, (3,) of any length, from the way its feet point; none where that is open."""
     forward, down = np.zeros((2, 3))
+    leg_lengths = 0.0
     upward = up / max(float(np.linalg.norm(up)), 1e-12)
     for leg in legs:
         foot = skeleton.heads[leg["foot"]]
@@ -226,8 +227,10 @@ def _left_by_feet(
         else:
             return None
         forward += tip - foot
-        down += foot - skeleton.heads[leg["thigh"]]
-    leg_lengths = float(np.linalg.norm(down))
+        way = foot - skeleton.heads[leg["thigh"]]
+        down += way
+        # Not of their sum: where one leg rests opposite to the other, that is rounding alone.
+        leg_lengths += float(np.linalg.norm(way))
     forward -= (forward @ upward) * upward
     # Some files rest with all bones along one axis: there, feet say nothing.
     if float(-down @ upward) < 0.5 * leg_lengths:

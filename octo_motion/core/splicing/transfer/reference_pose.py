@@ -39,6 +39,7 @@ from ...smoothing import smooth_step
 from ..clip import Clip, robust_direction, robust_rotations, usual_offsets
 from ..humanoid import Landmarks, palm_directions, palm_roots
 from .parts import spoken
+from .reference_feet import FootMoments, feet_at_rest
 
 _SAMPLES: Final = 240
 """Frames of a clip that are looked at."""
@@ -59,16 +60,6 @@ decides where a limb is always straight."""
 
 _POSED: Final = np.radians(60.0)
 """How far the parts of a body rest off the reference pose when a rest pose is one to stand in."""
-
-_STANCE: Final = 0.3
-"""Of all moments: for how many a foot stands at least. A foot of a walk stands for 0.6 of them."""
-
-_PLANTED: Final = (0.85, 0.98)
-"""Of the farthest that it ever is from the neck: a foot that is nearer is raised, or out in front;
-one that is farther stands."""
-
-_FEWEST: Final = 4
-"""Moments from which one sees how fast a foot moves."""
 
 _UPRIGHT: Final = float(np.cos(np.radians(35.0)))
 """Cosine of how far off the vertical people may stand on average, and that is still up."""
@@ -138,14 +129,25 @@ def has_palms(clip: Clip, landmarks: Landmarks) -> bool:
     return True
 
 
+def has_toes(clip: Clip, landmarks: Landmarks) -> bool:
+    """Whether joints tell where both feet point."""
+    return all(landmarks.get(f"toe.{side}") in clip.skeleton.index for side in "LR")
+
+
 def find_reference_pose(
-    clip: Clip, landmarks: Landmarks, *, fingers: bool = True, palms: bool = False
+    clip: Clip,
+    landmarks: Landmarks,
+    *,
+    fingers: bool = True,
+    palms: bool = False,
+    toes: bool = True,
 ) -> ReferencePose | None:
     """The reference pose of a clip; none where a landmark that it needs is missing.
 
     Fingers are joints: where they come to lie no rest pose may change. If neither of two bodies has
     any (``fingers``), forearms and hands are as they rest, where that is a pose of this body. If
-    both tell how their palms lie (``palms``), these face down, with the thumb in front.
+    both tell how their palms lie (``palms``), these face down, with the thumb in front; if both
+    have ``toes``, these point straight ahead.
     """
     if not len(clip) or not {
         *("hips", "chest", "thigh.L", "thigh.R", "upper_arm.L", "upper_arm.R")
@@ -154,7 +156,7 @@ def find_reference_pose(
     try:
         told = _told_by(clip, landmarks)
         finder = _Finder(told, landmarks)
-        return finder.pose(usual_offsets(told), fingers=fingers, palms=palms)
+        return finder.pose(usual_offsets(told), fingers=fingers, palms=palms, toes=toes)
     except _NoFrameError:
         return None
 
@@ -204,11 +206,13 @@ class _Finder:
         count = min(len(clip), _SAMPLES)
         rows = np.linspace(0, len(clip) - 1, count).astype(np.intp)
         self._turns, self._heads = clip.skeleton.pose(clip.rotations[rows], clip.locations[rows])
+        world = clip.world[rows, :3] / clip.scale
+        self._world = from_matrix(world[..., :3]), world[..., 3]
         index = clip.skeleton.index
         self._bones = {name: index[bone] for name, bone in landmarks.bones.items() if bone in index}
         self._standing = self._how_standing()
 
-    def pose(self, offsets: Floats, *, fingers: bool, palms: bool) -> ReferencePose:
+    def pose(self, offsets: Floats, *, fingers: bool, palms: bool, toes: bool) -> ReferencePose:
         """The whole."""
         made: dict[int, Floats] = {}
         hips, chest = self._bones["hips"], self._bones["chest"]
@@ -226,6 +230,7 @@ class _Finder:
             made |= self._arms_at_rest(made)
         if palms:
             made |= self._palms_down()
+        made |= feet_at_rest(self._feet(axes["hips"]), toes=toes)
         self._means(made, hips, chest)
         orientations = np.array([made[bone] for bone in range(len(self._skeleton))])
         return ReferencePose(orientations, offsets, self._fixed())
@@ -233,6 +238,21 @@ class _Finder:
     def upward(self) -> Floats:
         """(3,) from feet to head of who stands."""
         return robust_direction(self._upward, self._standing)
+
+    def _feet(self, pelvis: Floats) -> FootMoments:
+        sides = [side for side in "LR" if f"foot.{side}" in self._bones]
+        toes = {self._bones[f"foot.{each}"]: self._bones.get(f"toe.{each}", -1) for each in sides}
+        turns, shifts = self._world
+        hips = multiply(self._turns[:, self._bones["hips"]], pelvis)
+        heads = {b: rotate(turns, self._heads[:, b]) + shifts for b in (*toes, *toes.values())}
+        return FootMoments(
+            toes,
+            {foot: multiply(turns, self._turns[:, foot]) for foot in toes},
+            heads,
+            rotate(turns, self._upward),
+            rotate(turns, rotate(hips, -_Y)),
+            self._standing,
+        )
 
     def doubts(self) -> list[str]:
         """What the moments do not tell, or tell in two ways."""
@@ -294,20 +314,6 @@ class _Finder:
         reach = _lengths(self._upward) / max(full, 1e-12)
         least, most = _STANDING
         return np.maximum(smooth_step((reach - least) / (most - least)), _SITTING)
-
-    def _how_planted(self, foot: int) -> Floats:
-        """(moments,) weights: 1 where a foot rests under a leg that is stretched."""
-        places = self._heads[:, foot]
-        reach = _lengths(self._top() - places)
-        least, most = _PLANTED
-        full = max(float(np.quantile(reach, 0.95)), 1e-12)
-        reach = reach / full
-        weights = smooth_step((reach - least) / (most - least)) + _SITTING
-        if len(places) < _FEWEST:
-            return weights
-        speed = _lengths(np.gradient(places, axis=0))
-        usual = np.quantile(speed, _STANCE) + 1e-6 * full
-        return weights / (1.0 + (speed / usual) ** 4)
 
     def _joints(self, landmark: str) -> Floats:
         return self._heads[:, self._bones[landmark]]
@@ -462,15 +468,10 @@ class _Finder:
         # Between pelvis and chest as the chest sees them, above the pelvis as that does.
         spine = spine[: spine.index(hips)] if hips in spine else []
         above = skeleton.ancestors(hips)
-        # A foot that stands is flat, whatever its shin does.
-        feet = [self._bones[each] for each in ("foot.L", "foot.R") if each in self._bones]
-        carriers[spine], carriers[[*above, *feet]] = chest, hips
-        weights = np.repeat(self._standing[:, None], len(skeleton), axis=1)
-        for foot in feet:
-            weights[:, foot] *= self._how_planted(foot)
+        carriers[spine], carriers[above] = chest, hips
         between = multiply(conjugate(self._turns[:, carriers]), self._turns)
-        means = robust_rotations(between, weights)
-        for bone in (*spine, *above, *feet):
+        means = robust_rotations(between, self._standing[:, None])
+        for bone in (*spine, *above):
             made[bone] = multiply(made[carriers[bone]], means[bone])
         for bone, parent in enumerate(skeleton.parents):
             if bone not in made and parent >= 0:

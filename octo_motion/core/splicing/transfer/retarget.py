@@ -53,7 +53,14 @@ from .parts import (
     landmark_bone,
     sided,
 )
-from .reference_pose import ReferencePose, find_reference_pose, has_fingers, has_palms, standing_up
+from .reference_pose import (
+    ReferencePose,
+    find_reference_pose,
+    has_fingers,
+    has_palms,
+    has_toes,
+    standing_up,
+)
 from .same_body import agreeing
 from .upright import Body, body_of, facing, stand_over
 
@@ -73,11 +80,15 @@ class MappedClip:
         """The pose in which the skeleton rests, if it is its reference pose."""
         return None
 
-    def in_reference_pose(self, *, fingers: bool = True, palms: bool = False) -> MappedClip:
+    def in_reference_pose(
+        self, *, fingers: bool = True, palms: bool = False, toes: bool = True
+    ) -> MappedClip:
         """The clip with its reference pose as its rest pose; itself where none can be found."""
         if self.landmarks is None:
             return self
-        found = find_reference_pose(self.clip, self.landmarks, fingers=fingers, palms=palms)
+        found = find_reference_pose(
+            self.clip, self.landmarks, fingers=fingers, palms=palms, toes=toes
+        )
         if found is None:
             return self
         return self.referred(found)
@@ -161,11 +172,14 @@ def compared(base: MappedClip, splice: MappedClip) -> tuple[MappedClip, MappedCl
     fingers = any(
         has_fingers(each.clip, known) for each, known in zip((base, splice), marks, strict=True)
     )
+    toes = all(
+        has_toes(each.clip, known) for each, known in zip((base, splice), marks, strict=True)
+    )
     palms = all(
         has_palms(each.clip, known) for each, known in zip((base, splice), marks, strict=True)
     )
     referred = tuple(
-        each.in_reference_pose(fingers=fingers, palms=palms) for each in (base, splice)
+        each.in_reference_pose(fingers=fingers, palms=palms, toes=toes) for each in (base, splice)
     )
     first, second = (each.reference for each in referred)
     if first is None or second is None:
