@@ -40,7 +40,7 @@ def dense_keys(times: Floats, limb: Limb, every: int, *, loops: bool = False) ->
         axis=1,
     )
     spans = _Spans(times, targets, at)
-    slopes = spans.evened(np.gradient(targets, times, axis=2)[..., at])
+    slopes = spans.evened(np.gradient(targets, times, axis=2).take(at, axis=2))
     if loops:
         met = ~LinearModel(limb).turns_at_the_seam(at)
         slopes[:, met, 0] = slopes[:, met, -1] = 0.5 * (slopes[:, met, 0] + slopes[:, met, -1])
@@ -80,14 +80,14 @@ class _Spans:
         length = np.diff(times[at])[self._span]
         share = (times - times[at][self._span]) / length
         first, self._out, self._into, last = hermite(share, length)
-        self._straight = first * targets[..., at[self._span]]
-        self._straight += last * targets[..., at[self._span + 1]]
+        self._straight = first * targets.take(at[self._span], axis=2)
+        self._straight += last * targets.take(at[self._span + 1], axis=2)
         self._left = targets - self._straight
 
     def played(self, out: Floats, into: Floats) -> Floats:
         """Values (4, tracks, moments) of slopes (4, tracks, spans) after keys and before."""
-        result = self._straight + self._out * out[..., self._span]
-        result += self._into * into[..., self._span]
+        result = self._straight + self._out * out.take(self._span, axis=2)
+        result += self._into * into.take(self._span, axis=2)
         return result
 
     def _sums(self, values: Floats) -> Floats:

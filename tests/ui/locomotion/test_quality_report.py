@@ -14,7 +14,7 @@ import pytest
 from octo_motion.core.locomotion.metrics import report as quality
 from octo_motion.core.locomotion.metrics.report import KINDS, Figure, Measured
 from octo_motion.core.locomotion.rig.poses import Poses
-from octo_motion.core.rotations import rotate
+from octo_motion.core.rotations import angle_between, rotate
 from octo_motion.ui.locomotion.operators import quality as quality_operators
 from octo_motion.ui.locomotion.settings import properties as quality_report
 from octo_motion.ui.locomotion.writing import shot as shots
@@ -86,7 +86,8 @@ def test_the_figure_of_the_turn_is_what_blender_plays(octopus: Any) -> None:
         bpy.context.scene.frame_set(frame)
         world = octopus.matrix_world
         poses.append([(world @ octopus.pose.bones[name].matrix).to_quaternion() for name in bones])
-    played = quality.change(np.array(poses), np.arange(1.0, 81.0))
+    turned = angle_between(np.array(poses[:-1]), np.array(poses[1:]))
+    played = quality.change(turned, np.arange(1.0, 81.0))
     # Blender keeps matrices in single precision.
     assert played.value == pytest.approx(figure.value, abs=1e-4)
     assert played.sample + 1 == figure.frame

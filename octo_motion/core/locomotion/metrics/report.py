@@ -28,7 +28,7 @@ from ...rotations import (
 )
 from ..clearance import DEEP, Separation
 from ..ground import Ground
-from ..rig import ArmFrames, ArmSkin, Poses, halfway_linear
+from ..rig import ArmFrames, ArmSkin, Poses, halfway_linear, turns_in_world
 
 
 @dataclass(frozen=True)
@@ -73,12 +73,11 @@ def miss(misses: Floats) -> Worst:
     return _worst(misses)
 
 
-def change(rotations: Floats, frames: Floats) -> Worst:
-    """How far bones turn from one of the frames (frames,), ascending, to the next, radians per
-    frame, by unit quaternions (frames, bones, 4).
+def change(turned: Floats, frames: Floats) -> Worst:
+    """How far bones turn, radians per frame, by radians (frames − 1, bones) from one of the frames
+    (frames,), ascending, to the next.
     """
-    angle = angle_between(rotations[:-1], rotations[1:])
-    return _worst(angle / np.diff(frames)[:, None])
+    return _worst(turned / np.diff(frames)[:, None])
 
 
 def _worst(values: Floats) -> Worst:
@@ -236,12 +235,12 @@ def figures(measured: Measured) -> tuple[Figure, ...]:
     nowhere = measured.ground is None and measured.floor is None
     body = None if nowhere else _body(measured)
     shown = measured.as_it_plays
+    turning = _turning(shown)
     for number, name in enumerate(measured.names):
         arm = None if nowhere else _moving(measured, number)
         seen = arm if arm is None or shown is measured else _moving(shown, number)
         if len(measured.frames) > 1:
-            turned = _turned(shown, number) if seen is None else seen.orientations[::2]
-            keep("TURN", change(turned, measured.frames), name)
+            keep("TURN", change(turning[:, _bones(measured, number)], measured.frames), name)
         if arm is None or seen is None or body is None:
             continue
         length = measured.arms[number].length * measured.scale
@@ -351,14 +350,16 @@ def _body(measured: Measured) -> Floats:
     return (locations + rotate(orientations, measured.scale * middle))[::2]
 
 
-def _turned(measured: Measured, number: int) -> Floats:
-    """(frames, bones, 4) how the bones of an arm are turned on frames as it is played, world."""
+def _turning(measured: Measured) -> Floats:
+    """Radians (frames − 1, bones) by which the bones of all arms turn from frame to frame as they
+    are played, world.
+    """
     if measured.played is not None:
-        return measured.played.orientations[number][::2]
+        turned = np.concatenate([each[::2] for each in measured.played.orientations], axis=1)
+        return angle_between(turned[:-1], turned[1:])
     poses = measured.poses
-    own = measured.arms[number].rest.orientations(poses.rotations[:, _bones(measured, number)])
     _, orientations = measured.stays or (poses.locations, poses.orientations)
-    return multiply(orientations[:, None], own)
+    return turns_in_world(measured.arms, poses.rotations, orientations)
 
 
 def _bones(measured: Measured, number: int) -> slice:
