@@ -146,7 +146,7 @@ def _places() -> dict[str, list[Place]]:
         "plan: gaits, footholds": [(computing, "plan_motion")],
         "travel along the route": [(computing, "plan_travel"), (computing, "object_transforms")],
         "gait angles and targets": [(generator.GaitPoser, "pose"), (generator, "pseudo_targets")],
-        "solve (CCD)": [(generator, "solve_ccd"), (generator, "asked_shape")],
+        "solve (CCD)": [(generator, "solving_ccd"), (generator, "asked_shape")],
         "joints to bone rotations": [(generator, "rotate_bones")],
         "lay down what holds on": [(walk.GroundedWalk, "posing")],
         "let turns take their time": [(computing, "_take_time")],

@@ -14,7 +14,7 @@ from .corrections import (
     largest_turns,
     lead_past,
     raise_between_frames,
-    separate_arms,
+    separating_arms,
 )
 
 __all__ = [
@@ -33,5 +33,5 @@ __all__ = [
     "lead_past",
     "measure_overlap",
     "raise_between_frames",
-    "separate_arms",
+    "separating_arms",
 ]

@@ -5,7 +5,7 @@ their fastest turns eased.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -39,7 +39,7 @@ from ..rig import (
     turns_in_world,
 )
 from .capsule_overlap import Capsules, Crowd, Opened, Separation, measure_overlap
-from .overlap_solver import parted
+from .overlap_solver import parting
 from .way_past import Passing, led_past
 
 MOST_CAPSULES: Final = 16
@@ -82,7 +82,7 @@ def width_of(frames_per_cycle: float) -> int:
     return int(np.clip(np.rint(frames_per_cycle / _WIDTH), 1, _MOST_WIDTH))
 
 
-def separate_arms(
+def separating_arms(
     volume: BodyVolume,
     rotations: Floats,
     strains: Floats,
@@ -96,8 +96,9 @@ def separate_arms(
     rate: float,
     opened: Opened | None = None,
     cyclic: bool = False,
-) -> Floats | None:
-    """Rotations (frames, bones, 4) of arms that have made way; none if nobody has to.
+) -> Generator[float, None, Floats | None]:
+    """Rotations (frames, bones, 4) of arms that have made way; none if nobody has to. In steps
+    that yield the share that is done.
 
     Args:
         volume: the arms and the body.
@@ -116,7 +117,8 @@ def separate_arms(
     crowd = _Crowded.of(
         volume, rotations, strains, in_contact=in_contact, busy=busy, travel=travel, opened=opened
     )
-    moved = parted(
+    yield 0.0
+    moved = yield from parting(
         crowd.crowd,
         volume.still,
         floor=_floor(travel, ground, scale),
@@ -191,7 +193,7 @@ class _Crowded:
         travel: tuple[Floats, Floats],
         opened: Opened | None = None,
     ) -> _Crowded:
-        """What arms with these rotations and strains, as in :func:`separate_arms`, are."""
+        """What arms with these rotations and strains, as in :func:`separating_arms`, are."""
         some, chosen = _joints_chosen(volume.arms)
         posed = _Posed.of_all(volume.arms, rotations)
         joints = np.empty((len(rotations), len(volume.arms), len(chosen[0]), 3))

@@ -15,7 +15,7 @@ set-ups on bumps of 0.3 arm lengths, arms overlapping by 0.02 to 0.07 radii; "je
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from functools import cached_property
 from typing import Final, Protocol
 
@@ -135,7 +135,7 @@ class Floor(Protocol):
         ...
 
 
-def parted(
+def parting(
     crowd: Crowd,
     still: Sequence[Capsules],
     *,
@@ -143,8 +143,9 @@ def parted(
     width: int,
     rate: float,
     cyclic: bool = False,
-) -> Floats | None:
-    """Joints (frames, arms, joints, 3) of arms that have made way; none if nobody has to.
+) -> Generator[float, None, Floats | None]:
+    """Joints (frames, arms, joints, 3) of arms that have made way; none if nobody has to. In steps
+    that yield the share that is done.
 
     The result at a frame hangs on the frames within some reach of it, and on no state: the same
     motion gives the same result. Parts of the body that are ``still`` have one frame each;
@@ -156,6 +157,7 @@ def parted(
         return None
     touching = Touching(crowd, still)
     touches = touching.now()
+    yield 0.0
     chosen = touches.depth > _DONE
     pairs, counts = np.unique(touches.pair[chosen], return_counts=True)
     # What overlaps nearly all the while is the creature's own form, and not in anybody's way.
@@ -167,12 +169,14 @@ def parted(
     # Who makes way may be in the way of others then, but not for ever.
     around = widened(deep, _AROUND * blur_reach(width), cyclic=cyclic) > 0.0
     touching.look_at(around, own_form)
-    return _Parting(
+    crowded = _Parting(
         *(crowd, touching, np.flatnonzero(around), floor),
         width=width,
         unseen=_UNSEEN / rate,
         cyclic=cyclic,
-    ).run()
+    )
+    yield 0.0
+    return (yield from crowded.run())
 
 
 class _Parting:
@@ -207,24 +211,30 @@ class _Parting:
         )
         self._allowed, self._room = self._clearance()
 
-    def run(self) -> Floats:
-        """Joints (frames, arms, joints, 3) after all rounds."""
-        for _ in range(_ROUNDS):
+    def run(self) -> Generator[float, None, Floats]:
+        """Joints (frames, arms, joints, 3) after all rounds, in steps."""
+        rounds = _ROUNDS + _REPEATS
+        for number in range(_ROUNDS):
             touches = self._touching.at(self._joints)
+            yield number / rounds
             sunk = self._room.min() < -1e-4 * self._length
             if np.max(touches.depth, initial=0.0) <= _DONE and not sunk:
                 break
             wanted = self._spread(self._wanted(touches))
+            yield number / rounds
             chosen = np.nonzero(_differ(wanted, 0.0))
             if len(chosen[0]):
                 self._move(chosen, wanted[chosen])
+                yield number / rounds
         given_up = np.zeros(self._held.shape)
-        for _ in range(_REPEATS):
+        for number in range(_ROUNDS, rounds):
             more = np.maximum(given_up, self._hopeless(self._touching.at(self._joints)))
             if np.array_equal(more, given_up):
                 break
             given_up = more
+            yield number / rounds
             self._give_up(np.minimum(self._covered(given_up), 1.0))
+            yield number / rounds
         return self._joints
 
     # --- What is known before anything moves ---

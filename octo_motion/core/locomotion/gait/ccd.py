@@ -16,6 +16,7 @@ goes from one side to the other passes round the straight line and not through i
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -224,7 +225,7 @@ class JointChain:
         return tuple(group for group, size in each if size == _PAIR and self.pairs_as_asked)
 
 
-def solve_ccd(
+def solving_ccd(
     chain: JointChain,
     shape: Floats,
     links: Floats,
@@ -233,8 +234,8 @@ def solve_ccd(
     softness: float = 0.8,
     stretch_slack: float = 0.0,
     floor: Floats | None = None,
-) -> Floats:
-    """Directions (segments, 3, batch) of arms whose groups end at their targets.
+) -> Generator[None, None, Floats]:
+    """Directions (segments, 3, batch) of arms whose groups end at their targets, in steps.
 
     Sweeps of weighted CCD [Octopus, eq. 3.3, 3.7], and ours besides: closing and softening.
 
@@ -258,6 +259,7 @@ def solve_ccd(
             own = swept(own, lengths, chain.weights[segments], goal)
         directions[segments] = close_group(own, lengths, goal, stretch_slack=stretch_slack)
         root = root + chord(directions[segments], lengths)
+        yield
     iterations = SOFTENINGS if softness > 0.0 or floor is not None else 0
     for number in range(1, iterations + 1):
         before = directions
@@ -276,6 +278,7 @@ def solve_ccd(
                 directions[segments], lengths, goal, steps, stretch_slack=stretch_slack
             )
             root = root + chord(directions[segments], lengths)
+        yield
     return directions
 
 

@@ -8,7 +8,7 @@ arm for unit; so neither rest pose nor bone roll nor scale of the rig matters.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Final
@@ -30,6 +30,7 @@ from ...rotations import (
 from ...rotations.components_first import cumulative_sum
 from ...settings import check_settings, setting, share_setting
 from ...skeleton import Skeleton
+from ...steps import finished
 from ..rig import (
     ArmRest,
     BodyFrame,
@@ -54,7 +55,7 @@ from .ccd import (
     link_rotations,
     overreach,
     pseudo_targets,
-    solve_ccd,
+    solving_ccd,
     weighted_groups,
 )
 from .swim_spread import swim_azimuths, trailing_asides, trailing_beside
@@ -403,7 +404,7 @@ class GaitPoser:
             angles = gait_angles(gait, own, pairs, smoothing_cycles=self.settings.smoothing_cycles)
             angles[..., [PITCH, BANK]] *= self._hands[chosen][:, None, None]
             # Not from what is kept: that does not know the floor.
-            directions, _ = self._shapes(part, angles, np.zeros((1, len(chosen))))
+            directions, _ = finished(self._shaping(part, angles, np.zeros((1, len(chosen)))))
             # Up is the same for the arm's frame and the body's.
             climbs = cumulative_sum(build.chain.lengths[:, None, None] * directions[:, 2])
             lowest = np.minimum(climbs.min(axis=0), 0.0)
@@ -516,11 +517,17 @@ class GaitPoser:
         Angles (frames, arms, links, 3) and steering (frames, arms) of this build are from
         :meth:`asked`.
         """
+        return finished(self.shaping(build, angles, steering))
+
+    def shaping(
+        self, build: Build, angles: Floats, steering: Floats
+    ) -> Generator[None, None, tuple[Floats, Floats]]:
+        """The same in steps."""
         if angles.shape[0] * angles.shape[1] > _FEW:
-            return self._shapes(build, angles, steering)
+            return (yield from self._shaping(build, angles, steering))
         # What is asked again and again, about a gait as such.
         key = content_key(build.arms, angles, steering)
-        return self._few.get(key, lambda: self._shapes(build, angles, steering))
+        return self._few.get(key, lambda: finished(self._shaping(build, angles, steering)))
 
     def chains(
         self, build: Build, angles: Floats, steering: Floats
@@ -545,7 +552,9 @@ class GaitPoser:
         targets[..., 1:, 2] = smooth_floor(targets[..., 1:, 2], floor[:, None], FLOOR_ROUNDING)
         return links, targets, floor
 
-    def _shapes(self, build: Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
+    def _shaping(
+        self, build: Build, angles: Floats, steering: Floats
+    ) -> Generator[None, None, tuple[Floats, Floats]]:
         frames, arms = angles.shape[:2]
         batch = frames * arms
         links, targets, floor = self.chains(build, angles, steering)
@@ -555,7 +564,7 @@ class GaitPoser:
         steered[..., 0, 1] += steering
         sway = np.broadcast_to(self._sway[list(build.arms)], (frames, arms, 2)).reshape(batch, 2)
         shape = asked_shape(build.chain, _batch_last(steered, batch), sway.T)
-        directions = solve_ccd(
+        directions = yield from solving_ccd(
             build.chain,
             shape,
             links,

@@ -17,6 +17,7 @@ from one frame to the next changes, 0.088.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -239,15 +240,15 @@ def stance_at(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Flo
     )
 
 
-def pulled_to_footholds(
+def pulling_to_footholds(
     batch: Batch, shapes: Floats, stance: Stance, ground: Ground, settings: StanceSettings
-) -> tuple[Floats, Floats]:
-    """Strains (segments, batch) and directions (segments, 3, batch) of arms.
+) -> Generator[None, None, tuple[Floats, Floats]]:
+    """Strains (segments, batch) and directions (segments, 3, batch) of arms, in steps.
 
     Arms with their gait's shapes (segments, 3, batch), world, brought to their footholds; in the
     air they may be in the ground.
     """
-    strains, standing = _in_stance(batch, shapes, stance, ground, settings)
+    strains, standing = yield from _in_stance(batch, shapes, stance, ground, settings)
     return strains, lerp_bends(batch.outward, standing, shapes, 1.0 - stance.weight)
 
 
@@ -264,7 +265,7 @@ def kept_over_ground(
     lift: Floats,
 ) -> StancePose:
     """Arms that are in the air brought off the ground, by strains and directions as
-    :func:`pulled_to_footholds` returns them, half way so many arm lengths (batch,) high.
+    :func:`pulling_to_footholds` returns them, half way so many arm lengths (batch,) high.
     """
     (strains, directions), weight, reach = pose, stance.weight, batch.reach
     lengths = batch.lengths * (1.0 + strains)
@@ -320,7 +321,7 @@ def _crested(stance: Stance, ground: Ground) -> Floats:
 
 def _in_stance(
     batch: Batch, shapes: Floats, stance: Stance, ground: Ground, settings: StanceSettings
-) -> tuple[Floats, Floats]:
+) -> Generator[None, None, tuple[Floats, Floats]]:
     """Strains (segments, batch) and directions (segments, 3, batch) of arms that hold on.
 
     Arms that do not, for the moment, are posed as they held on last, or will next; of those that
@@ -339,7 +340,7 @@ def _in_stance(
     own = components_first.normalized(
         guess + (kept * _freedom(batch, stance))[:, None] * (shapes - guess)
     )
-    own = _drawn_to_foothold(batch, own, stance, ground, strain=strain, chord=chord)
+    own = yield from _drawn_to_foothold(batch, own, stance, ground, strain=strain, chord=chord)
     own = _laid_on_ground(batch, own, strain, stance, ground)
     strains[:, chosen], directions[..., chosen] = strain * stance.weight, own
     return strains, directions
@@ -347,7 +348,7 @@ def _in_stance(
 
 def _drawn_to_foothold(
     batch: Batch, own: Floats, stance: Stance, ground: Ground, *, strain: Floats, chord: Floats
-) -> Floats:
+) -> Generator[None, None, Floats]:
     """Directions (segments, 3, batch) of arms in stance, from their own, that meet their footholds.
 
     Strain (segments, batch) is by how much bones are longer than at rest, as a share; the chord (3,
@@ -380,6 +381,7 @@ def _drawn_to_foothold(
         own = drawn(
             own, lengths, free=free, chosen=to_goal, roots=batch.roots, goal=goal, steps=steps
         )
+        yield
     return own
 
 

@@ -24,7 +24,7 @@ from .stance_swing import (
     StancePose,
     airborne,
     kept_over_ground,
-    pulled_to_footholds,
+    pulling_to_footholds,
     stance_at,
 )
 from .surface import Foothold, Ground, GroundedPoses, Limbs, Raise, StanceSettings
@@ -222,7 +222,7 @@ class WalkPart:
         asked = None
         if higher is None or higher.shapes is None:
             every = list(self.build.arms)
-            shapes, _ = self.poser.shapes(
+            shapes, _ = yield from self.poser.shaping(
                 self.build, moments.angles[:, every], moments.steering[:, every]
             )
             asked = shapes
@@ -233,7 +233,8 @@ class WalkPart:
         shapes = components_first.rotate(facing, shapes[..., chosen].reshape(bones, 3, -1))
         times = (each[:, columns].reshape(-1) for each in (moments.cycles, moments.since))
         stance = stance_at(arms, self.footholds, *times)
-        strains, ways = pulled_to_footholds(arms, shapes, stance, self.ground, self.settings)
+        pulling = pulling_to_footholds(arms, shapes, stance, self.ground, self.settings)
+        strains, ways = yield from pulling
         yield
         evened, each_frame = None, (bones, 3, frames, many)
         if higher is not None and higher.evened:
@@ -247,6 +248,7 @@ class WalkPart:
         yield
         lift = np.repeat(moments.lift, many)
         pose = kept_over_ground(arms, (strains, ways), stance, self.ground, lift)
+        yield
         twists = bone_twists(self.build, moments.angles[:, columns])
         joints = pose.joints.reshape(bones + 1, 3, frames, many)
         in_contact = pose.in_contact.reshape(bones + 1, frames, many)

@@ -26,7 +26,7 @@ from ..clearance import (
     largest_turns,
     lead_past,
     raise_between_frames,
-    separate_arms,
+    separating_arms,
 )
 from ..gait import CYCLE
 from ..ground import Ground, sample_ground
@@ -265,7 +265,8 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     # What is reached for is in the world.
     reached = _reach(plan, arms, keyed, going) if plan.carry is None else None
     yield 0.96
-    warnings = _separate(plan, arms, reached, going, swimming=swimming, cyclic=cyclic)
+    making_way = _separate(plan, arms, reached, going, swimming=swimming, cyclic=cyclic)
+    warnings = yield from _scaled(making_way, 0.96, 0.98)
     yield 0.98
     _take_time(plan, arms, reached, going, cyclic=cyclic)
     planned = None
@@ -536,14 +537,14 @@ def _separate(
     *,
     swimming: Floats | None,
     cyclic: bool,
-) -> list[str]:
+) -> Steps[list[str]]:
     """Let arms make way for each other, but for those that reach; what there is to warn of."""
     job, volume = plan.job, plan.job.volume
     if volume is None or not job.keep_apart:
         return []
     if too_many := volume.too_many(len(arms.rotations)):
         return [too_many]
-    moved = separate_arms(
+    moved = yield from separating_arms(
         volume,
         arms.rotations,
         arms.strains,

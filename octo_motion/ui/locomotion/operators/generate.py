@@ -141,8 +141,9 @@ _SOON: Final = 0.0
 """Seconds from a change to the frame in sight at least: what changes together is told together."""
 _IDLE: Final = 0.1
 """Seconds without a change after which all other frames follow …"""
-_TURN: Final = 0.008
-"""… and for how long at a time."""
+_TURN: Final = 0.004
+"""… and for how long at a time, before a step of the work that has begun is let end: it takes about
+as long again."""
 _LATER: Final = 0.3
 """Seconds until it is tried again, while Blender renders or a tool of ours runs."""
 _NO_MATTER: Final = RESULTS | {

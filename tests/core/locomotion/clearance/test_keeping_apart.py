@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure_overlap
-from octo_motion.core.locomotion.clearance.corrections import BodyVolume, separate_arms
+from octo_motion.core.locomotion.clearance.corrections import BodyVolume, separating_arms
 from octo_motion.core.locomotion.rig.arm_chains import body_frame
 from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_arm
 from octo_motion.core.rotations import IDENTITY, Floats, from_axis_angle, multiply
+from octo_motion.core.steps import finished
 from tests.core.rigs import UP, bone_matrix, skeleton_of
 
 FRAMES = 90
@@ -65,7 +66,7 @@ def deepest(bulk: BodyVolume, rotations: Floats) -> float:
 
 def apart(bulk: BodyVolume, rotations: Floats) -> Floats | None:
     travel = np.zeros((FRAMES, 3)), np.tile(IDENTITY, (FRAMES, 1))
-    return separate_arms(
+    steps = separating_arms(
         bulk,
         rotations,
         np.zeros(rotations.shape[:2]),
@@ -77,6 +78,7 @@ def apart(bulk: BodyVolume, rotations: Floats) -> Floats | None:
         frames_per_cycle=48.0,
         rate=24.0,
     )
+    return finished(steps)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 """Arms that would pass through each other make way: smoothly, and what lies on the ground stays."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,9 +19,10 @@ from octo_motion.core.locomotion.clearance.capsule_overlap import (
     aside,
     measure_overlap,
 )
-from octo_motion.core.locomotion.clearance.overlap_solver import joints_of, parted, turned_towards
+from octo_motion.core.locomotion.clearance.overlap_solver import joints_of, parting, turned_towards
 from octo_motion.core.rotations import Floats
 from octo_motion.core.smoothing import blur_reach, blurred, covered
+from octo_motion.core.steps import finished
 
 SEEDS = st.integers(0, 2**31)
 UP = np.array([0.0, 0.0, 1.0])
@@ -225,6 +227,11 @@ def depth(group: Crowd, joints: Floats) -> Floats:
         for k in range(joints.shape[1])
     ]
     return measure_overlap(own).depths
+
+
+def parted(*given: Any, **named: Any) -> Floats | None:
+    """Joints of arms that have made way, without a break."""
+    return finished(parting(*given, **named))
 
 
 def swinging(height: float = 0.1) -> Floats:

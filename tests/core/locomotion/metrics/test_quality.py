@@ -36,7 +36,9 @@ def test_change_is_the_angle_from_frame_to_frame() -> None:
     turn = np.array([0.0, 0.1, 0.3, 0.3])
     rotations = from_axis_angle(np.array([0.0, 1.0, 0.0]), turn)[:, None]
     rotations[2] *= -1.0
-    worst = quality.change(angle_between(rotations[:-1], rotations[1:]), np.array([1.0, 2.0, 2.5, 3.5]))
+    worst = quality.change(
+        angle_between(rotations[:-1], rotations[1:]), np.array([1.0, 2.0, 2.5, 3.5])
+    )
     assert worst.value == pytest.approx(0.4)
     assert (worst.sample, worst.arm) == (1, 0)
 
