@@ -16,7 +16,7 @@ goes from one side to the other passes round the straight line and not through i
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -234,8 +234,9 @@ def solving_ccd(
     softness: float = 0.8,
     stretch_slack: float = 0.0,
     floor: Floats | None = None,
-) -> Generator[None, None, Floats]:
-    """Directions (segments, 3, batch) of arms whose groups end at their targets, in steps.
+) -> Iterator[Floats]:
+    """Directions (segments, 3, batch) of arms whose groups end at their targets: as far as they are
+    found after each of some steps, the last ones are the answer.
 
     Sweeps of weighted CCD [Octopus, eq. 3.3, 3.7], and ours besides: closing and softening.
 
@@ -259,7 +260,7 @@ def solving_ccd(
             own = swept(own, lengths, chain.weights[segments], goal)
         directions[segments] = close_group(own, lengths, goal, stretch_slack=stretch_slack)
         root = root + chord(directions[segments], lengths)
-        yield
+        yield directions
     iterations = SOFTENINGS if softness > 0.0 or floor is not None else 0
     for number in range(1, iterations + 1):
         before = directions
@@ -278,8 +279,7 @@ def solving_ccd(
                 directions[segments], lengths, goal, steps, stretch_slack=stretch_slack
             )
             root = root + chord(directions[segments], lengths)
-        yield
-    return directions
+        yield directions
 
 
 def asked_shape(chain: JointChain, angles: Floats, sway: Floats) -> Floats:

@@ -8,7 +8,8 @@ arm for unit; so neither rest pose nor bone roll nor scale of the rig matters.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections import deque
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Final
@@ -30,7 +31,6 @@ from ...rotations import (
 from ...rotations.components_first import cumulative_sum
 from ...settings import check_settings, setting, share_setting
 from ...skeleton import Skeleton
-from ...steps import finished
 from ..rig import (
     ArmRest,
     BodyFrame,
@@ -404,7 +404,7 @@ class GaitPoser:
             angles = gait_angles(gait, own, pairs, smoothing_cycles=self.settings.smoothing_cycles)
             angles[..., [PITCH, BANK]] *= self._hands[chosen][:, None, None]
             # Not from what is kept: that does not know the floor.
-            directions, _ = finished(self._shaping(part, angles, np.zeros((1, len(chosen)))))
+            directions, _ = self._shapes(part, angles, np.zeros((1, len(chosen))))
             # Up is the same for the arm's frame and the body's.
             climbs = cumulative_sum(build.chain.lengths[:, None, None] * directions[:, 2])
             lowest = np.minimum(climbs.min(axis=0), 0.0)
@@ -517,17 +517,23 @@ class GaitPoser:
         Angles (frames, arms, links, 3) and steering (frames, arms) of this build are from
         :meth:`asked`.
         """
-        return finished(self.shaping(build, angles, steering))
-
-    def shaping(
-        self, build: Build, angles: Floats, steering: Floats
-    ) -> Generator[None, None, tuple[Floats, Floats]]:
-        """The same in steps."""
         if angles.shape[0] * angles.shape[1] > _FEW:
-            return (yield from self._shaping(build, angles, steering))
+            return self._shapes(build, angles, steering)
         # What is asked again and again, about a gait as such.
         key = content_key(build.arms, angles, steering)
-        return self._few.get(key, lambda: finished(self._shaping(build, angles, steering)))
+        return self._few.get(key, lambda: self._shapes(build, angles, steering))
+
+    def shaping(self, build: Build, angles: Floats, steering: Floats) -> Iterator[Floats]:
+        """Directions as of :meth:`shapes`, as far as they are found after each of some steps; the
+        last ones are the answer.
+        """
+        frames, arms = angles.shape[:2]
+        if frames * arms <= _FEW:
+            yield self.shapes(build, angles, steering)[0]
+            return
+        asked = self.chains(build, angles, steering)
+        for directions in self._solving(build, angles, steering, asked):
+            yield directions.reshape(len(directions), 3, frames, arms)
 
     def chains(
         self, build: Build, angles: Floats, steering: Floats
@@ -552,27 +558,35 @@ class GaitPoser:
         targets[..., 1:, 2] = smooth_floor(targets[..., 1:, 2], floor[:, None], FLOOR_ROUNDING)
         return links, targets, floor
 
-    def _shaping(
-        self, build: Build, angles: Floats, steering: Floats
-    ) -> Generator[None, None, tuple[Floats, Floats]]:
+    def _solving(
+        self,
+        build: Build,
+        angles: Floats,
+        steering: Floats,
+        asked: tuple[Floats, Floats, Floats | None],
+    ) -> Iterator[Floats]:
+        """Directions (segments, 3, frames · arms) of what :meth:`chains` asks for, in steps."""
         frames, arms = angles.shape[:2]
         batch = frames * arms
-        links, targets, floor = self.chains(build, angles, steering)
-        links, targets = _batch_last(links, batch), _batch_last(targets, batch)
-        floor = None if floor is None else np.tile(floor, frames)
+        links, targets, floor = asked
         steered = angles[..., [HEAD, PITCH]]
         steered[..., 0, 1] += steering
         sway = np.broadcast_to(self._sway[list(build.arms)], (frames, arms, 2)).reshape(batch, 2)
-        shape = asked_shape(build.chain, _batch_last(steered, batch), sway.T)
-        directions = yield from solving_ccd(
+        return solving_ccd(
             build.chain,
-            shape,
-            links,
-            targets,
+            asked_shape(build.chain, _batch_last(steered, batch), sway.T),
+            _batch_last(links, batch),
+            _batch_last(targets, batch),
             softness=self.settings.softness,
             stretch_slack=self.settings.stretch_slack,
-            floor=floor,
+            floor=None if floor is None else np.tile(floor, frames),
         )
+
+    def _shapes(self, build: Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
+        frames, arms = angles.shape[:2]
+        asked = self.chains(build, angles, steering)
+        (directions,) = deque(self._solving(build, angles, steering, asked), maxlen=1)
+        targets = _batch_last(asked[1], frames * arms)
         joints = cumulative_sum(build.chain.lengths[:, None, None] * directions)
         ends = joints[np.cumsum(build.chain.sizes) - 1]
         missed = np.linalg.norm(ends - targets[1:], axis=1)

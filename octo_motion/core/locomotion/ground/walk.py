@@ -222,10 +222,13 @@ class WalkPart:
         asked = None
         if higher is None or higher.shapes is None:
             every = list(self.build.arms)
-            shapes, _ = yield from self.poser.shaping(
+            for found in self.poser.shaping(
                 self.build, moments.angles[:, every], moments.steering[:, every]
-            )
-            asked = shapes
+            ):
+                asked = found
+                yield
+            assert asked is not None
+            shapes = asked
         else:
             shapes = higher.shapes[number]
         arms, facing = self._batch(moments, chosen, higher)
