@@ -523,17 +523,21 @@ class GaitPoser:
         key = content_key(build.arms, angles, steering)
         return self._few.get(key, lambda: self._shapes(build, angles, steering))
 
-    def shaping(self, build: Build, angles: Floats, steering: Floats) -> Iterator[Floats]:
+    def shaping(
+        self,
+        build: Build,
+        angles: Floats,
+        steering: Floats,
+        asked: tuple[Floats, Floats, Floats | None],
+    ) -> Iterator[Floats]:
         """Directions as of :meth:`shapes`, as far as they are found after each of some steps; the
-        last ones are the answer.
+        last ones are the answer. What is asked is from :meth:`chains`.
         """
-        frames, arms = angles.shape[:2]
-        if frames * arms <= _FEW:
-            yield self.shapes(build, angles, steering)[0]
-            return
-        asked = self.chains(build, angles, steering)
-        for directions in self._solving(build, angles, steering, asked):
-            yield directions.reshape(len(directions), 3, frames, arms)
+        steered = angles[..., [HEAD, PITCH]]
+        steered[..., 0, 1] += steering
+        sway = self._sway[list(build.arms)]
+        for directions in _solving(build, self.settings, sway, steered, asked):
+            yield directions.reshape(len(directions), 3, *angles.shape[:2])
 
     def chains(
         self, build: Build, angles: Floats, steering: Floats
@@ -558,48 +562,52 @@ class GaitPoser:
         targets[..., 1:, 2] = smooth_floor(targets[..., 1:, 2], floor[:, None], FLOOR_ROUNDING)
         return links, targets, floor
 
-    def _solving(
-        self,
-        build: Build,
-        angles: Floats,
-        steering: Floats,
-        asked: tuple[Floats, Floats, Floats | None],
-    ) -> Iterator[Floats]:
-        """Directions (segments, 3, frames · arms) of what :meth:`chains` asks for, in steps."""
-        frames, arms = angles.shape[:2]
-        batch = frames * arms
-        links, targets, floor = asked
-        steered = angles[..., [HEAD, PITCH]]
-        steered[..., 0, 1] += steering
-        sway = np.broadcast_to(self._sway[list(build.arms)], (frames, arms, 2)).reshape(batch, 2)
-        return solving_ccd(
-            build.chain,
-            asked_shape(build.chain, _batch_last(steered, batch), sway.T),
-            _batch_last(links, batch),
-            _batch_last(targets, batch),
-            softness=self.settings.softness,
-            stretch_slack=self.settings.stretch_slack,
-            floor=None if floor is None else np.tile(floor, frames),
-        )
-
     def _shapes(self, build: Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
-        frames, arms = angles.shape[:2]
         asked = self.chains(build, angles, steering)
-        (directions,) = deque(self._solving(build, angles, steering, asked), maxlen=1)
-        targets = _batch_last(asked[1], frames * arms)
-        joints = cumulative_sum(build.chain.lengths[:, None, None] * directions)
+        (directions,) = deque(self.shaping(build, angles, steering, asked), maxlen=1)
+        frames, arms = angles.shape[:2]
+        joints = directions.reshape(len(directions), 3, frames * arms)
+        joints = cumulative_sum(build.chain.lengths[:, None, None] * joints)
         ends = joints[np.cumsum(build.chain.sizes) - 1]
-        missed = np.linalg.norm(ends - targets[1:], axis=1)
-        if self.settings.stretch_slack > 0.0:
-            roots = np.concatenate([np.zeros_like(ends[:1]), ends[:-1]])
-            chords = np.linalg.norm(targets[1:] - roots, axis=1)
-            beyond = overreach(chords, build.widths[:, None], self.settings.stretch_slack)
-            # A group of a single bone begins where the one before has ended, and ends as far off.
-            missed = np.maximum(missed - beyond.cumsum(axis=0), 0.0)
-        return (
-            directions.reshape(len(directions), 3, frames, arms),
-            np.moveaxis(missed.reshape(GROUPS, frames, arms), 0, -1),
-        )
+        missed = _missed(build, ends, _batch_last(asked[1], frames * arms), self.settings)
+        return directions, np.moveaxis(missed.reshape(GROUPS, frames, arms), 0, -1)
+
+
+def _missed(build: Build, ends: Floats, targets: Floats, settings: GaitSettings) -> Floats:
+    """How far (groups, batch) ends of groups (groups, 3, batch) are from pseudo-targets Q₀ … Q₃."""
+    missed = np.linalg.norm(ends - targets[1:], axis=1)
+    if settings.stretch_slack > 0.0:
+        roots = np.concatenate([np.zeros_like(ends[:1]), ends[:-1]])
+        chords = np.linalg.norm(targets[1:] - roots, axis=1)
+        beyond = overreach(chords, build.widths[:, None], settings.stretch_slack)
+        # A group of a single bone begins where the one before has ended, and ends as far off.
+        missed = np.maximum(missed - beyond.cumsum(axis=0), 0.0)
+    return missed
+
+
+def _solving(
+    build: Build,
+    settings: GaitSettings,
+    sway: Floats,
+    steered: Floats,
+    asked: tuple[Floats, Floats, Floats | None],
+) -> Iterator[Floats]:
+    """Directions (segments, 3, frames · arms), in steps, of what :meth:`GaitPoser.chains` asks for,
+    at heads and pitches (frames, arms, links, 2) with sways (arms, 2).
+    """
+    frames, arms = steered.shape[:2]
+    batch = frames * arms
+    links, targets, floor = asked
+    swaying = np.broadcast_to(sway, (frames, arms, 2)).reshape(batch, 2)
+    return solving_ccd(
+        build.chain,
+        asked_shape(build.chain, _batch_last(steered, batch), swaying.T),
+        _batch_last(links, batch),
+        _batch_last(targets, batch),
+        softness=settings.softness,
+        stretch_slack=settings.stretch_slack,
+        floor=None if floor is None else np.tile(floor, frames),
+    )
 
 
 def target_places(poser: GaitPoser, phase: Floats, turn: Floats) -> Floats:

@@ -221,14 +221,7 @@ class WalkPart:
             return PartPoses.of_none(frames, bones)
         asked = None
         if higher is None or higher.shapes is None:
-            every = list(self.build.arms)
-            for found in self.poser.shaping(
-                self.build, moments.angles[:, every], moments.steering[:, every]
-            ):
-                asked = found
-                yield
-            assert asked is not None
-            shapes = asked
+            shapes = asked = yield from self._asked(moments)
         else:
             shapes = higher.shapes[number]
         arms, facing = self._batch(moments, chosen, higher)
@@ -265,6 +258,17 @@ class WalkPart:
             shapes=asked,
             evened=evened,
         )
+
+    def _asked(self, moments: Moments) -> Generator[None, None, Floats]:
+        """The gait's own directions (segments, 3, frames, arms of the build), in steps."""
+        every = list(self.build.arms)
+        angles, steering = moments.angles[:, every], moments.steering[:, every]
+        chains = self.poser.chains(self.build, angles, steering)
+        directions = np.zeros(0)
+        for found in self.poser.shaping(self.build, angles, steering, chains):
+            directions = found
+            yield
+        return directions
 
     def _batch(
         self, moments: Moments, chosen: list[int], higher: Raise | None
