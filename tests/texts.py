@@ -228,7 +228,8 @@ def registered() -> dict[str, set[str]]:
             continue
         others.update(_properties(kind))
         operator = issubclass(kind, bpy.types.Operator)
-        (labels if operator else others).add(getattr(kind, "bl_label", ""))
+        if not issubclass(kind, bpy.types.Menu):  # whose label is the preset that was chosen last
+            (labels if operator else others).add(getattr(kind, "bl_label", ""))
         others.add(getattr(kind, "bl_description", None) or "")
         others.add(getattr(kind, "bl_category", ""))
     for owner in (bpy.types.Object, bpy.types.WindowManager):
