@@ -46,6 +46,11 @@ def action_of(item: Any) -> Any:
     return data.action if data is not None else None
 
 
+def joints(item: Any) -> list[tuple[float, ...]]:
+    """Where its bones begin, world space."""
+    return [tuple(item.matrix_world @ each.head) for each in item.pose.bones]
+
+
 def select(item: Any) -> None:
     """Make an object active alone, as a click on it does."""
     for each in bpy.data.objects:
@@ -131,9 +136,10 @@ def live_drag(hand: Hand, figures: Figures) -> Steps:
     ground: Any = bpy.context.object
     for vertex in ground.data.vertices:
         vertex.co.z = 0.08 * sin(3.0 * vertex.co.x) * cos(2.5 * vertex.co.y)
+    select(octopus())
+    bpy.ops.octo_motion.setup_load(name="walk")
     own = settings()
     own.ground.object, own.timing, own.frame_end = ground, "RANGE", 700
-    select(octopus())
     bpy.context.scene.frame_set(120)
     own.live = True
     yield from hand.until(lambda: action_of(octopus()).frame_range[1] == 700, "The live motion")
@@ -141,8 +147,10 @@ def live_drag(hand: Hand, figures: Figures) -> Steps:
     route = own.route
     select(route)
     yield from hand.over()
-    before = [tuple(each.matrix.translation) for each in octopus().pose.bones]
-    latencies, shown, own_work = [], before, _timed_follow()
+    with bpy.context.temp_override(window=hand.window, area=hand.area(), region=hand.region()):
+        bpy.ops.view3d.view_selected()
+    yield 1.0
+    latencies, shown, own_work = [], joints(octopus()), _timed_follow()
     draws, begun = len(hand.draws), time.perf_counter()
     yield from hand.key("G")
     x, y = hand._place
@@ -153,7 +161,7 @@ def live_drag(hand: Hand, figures: Figures) -> Steps:
         hand.event("MOUSEMOVE", "NOTHING")
         while time.perf_counter() - moved < 3.0:
             yield 0.0
-            now = [tuple(each.matrix.translation) for each in octopus().pose.bones]
+            now = joints(octopus())
             if now != shown and hand.draws[-1] > moved:
                 shown = now
                 latencies.append(hand.draws[-1] - moved)
