@@ -32,7 +32,16 @@ CODE = re.compile(r"[A-Z]+(_[A-Z]+)+|[a-z_]+\.[LR]")
 """Identifiers, and landmarks as files name them."""
 LOOKED_UP = {"phrase", "as_phrase", "translated", "reported", "hinted"}
 """Functions whose first argument is a text."""
-NAMED = {"text", "title", "bl_label", "bl_description", "bl_category", "remedy", "problem"}
+NAMED = {
+    "text",
+    "title",
+    "heading",
+    "bl_label",
+    "bl_description",
+    "bl_category",
+    "remedy",
+    "problem",
+}
 """Arguments and class attributes that are texts."""
 SAID = {"message", "instead", "one", "_stopped"}
 """Attributes and fields that hold a text."""

@@ -58,7 +58,7 @@ class OCTO_MOTION_AP_preferences(bpy.types.AddonPreferences):
         update=lambda self, _context: _hand_on(self),
     )
 
-    def draw(self, context: bpy.types.Context) -> None:  # noqa: ARG002 - Blender's signature
+    def draw(self, context: bpy.types.Context) -> None:
         layout = cast("Any", self).layout
         layout.use_property_split = True
         column = layout.column(heading="New")
@@ -66,6 +66,11 @@ class OCTO_MOTION_AP_preferences(bpy.types.AddonPreferences):
         for name in ("keys", "layer", "fade_unit"):
             column.row().prop(self, name, expand=True)
         layout.prop(self, "port")
+        if context.preferences is not None:
+            # Blender's own switch: what it says of reports is true of ours.
+            view = context.preferences.view
+            column = layout.column(heading="Messages")
+            column.prop(view, "use_translate_reports", text="In Blender's Language")
         layout.operator(OCTO_MOTION_OT_manual.bl_idname, icon="HELP", text="Open the Manual")
 
 

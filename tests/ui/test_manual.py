@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The manual: a chapter for each panel and operator, in the sources and in the zip alike."""
 
+from __future__ import annotations
+
 import re
 import runpy
 from fnmatch import fnmatchcase
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import bpy
 import pytest
@@ -78,6 +80,29 @@ def test_a_new_creature_begins_as_the_preferences_say(monkeypatch: pytest.Monkey
     # What a script makes is the same at every computer.
     plain: Any = make_octopus("Plain")
     assert plain.octo_motion.locomotion.keys == "DENSE"
+
+
+def test_messages_can_stay_english_in_a_blender_that_speaks_another_language() -> None:
+    said: list[str] = []
+
+    class Layout:
+        use_property_split = True
+
+        def column(self, **_: str) -> Layout:
+            return self
+
+        row = column
+
+        def prop(self, _owner: Any, name: str, **_: Any) -> None:
+            said.append(name)
+
+        def operator(self, *_: str, **_more: str) -> None: ...
+
+    own = SimpleNamespace(layout=Layout())
+    preferences.OCTO_MOTION_AP_preferences.draw(cast("Any", own), bpy.context)
+    assert "use_translate_reports" in said
+    view: Any = cast("Any", bpy.context.preferences).view
+    assert hasattr(view, "use_translate_reports")
 
 
 def test_without_a_window_preferences_count_for_nothing() -> None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Install the zip into an empty user folder, and let a Blender with a window live the first hour.
 
-    python -m tests.window ARCHIVE [STEPS] [--language ja_JP] [--folder build/window]
+    python -m tests.window ARCHIVE [STEPS] [--language ja_JP] [--folder build/window] [--keep]
 
 BLENDER names the Blender, options may follow it. Where there is none, or no display, that is said
 and nothing is tried. Each step leaves pictures and a line in report.json; hour.png shows the
@@ -25,6 +25,8 @@ from typing import Any
 import bpy
 import numpy as np
 
+from tests.window import kept
+
 HERE = Path(__file__).resolve().parent
 CLIPS = HERE.parent.parent / "docs" / "examples" / "clips"
 COLUMNS = 4
@@ -40,6 +42,9 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("steps", nargs="*", help="of the first hour; all if none is named")
     parser.add_argument("--language", default="en_US", help="that Blender speaks, such as ja_JP")
     parser.add_argument("--folder", type=Path, default=Path("build/window"))
+    parser.add_argument(
+        "--keep", action="store_true", help="in docs/first_hour.md, if it went well"
+    )
     chosen = parser.parse_args(arguments)
     words = shlex.split(os.environ.get("BLENDER") or "blender", posix=not WINDOWS)
     if missing := no_window(words[0]):
@@ -67,7 +72,10 @@ def main(arguments: Sequence[str]) -> int:
             timeout=PATIENCE,
         )
     join(sorted(folder.glob("*.png"), key=os.path.getmtime), folder / "hour.png")
-    return told(folder, ended.returncode)
+    status = told(folder, ended.returncode)
+    if chosen.keep and status == 0:
+        print(f"Kept: {kept.keep(folder, chosen.language)}")
+    return status
 
 
 def join(pictures: Sequence[Path], path: Path) -> None:

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What docs/first_hour.md shows: runs of the first hour that were kept, each as a sheet of its
+pictures and as the figures of its report. The page's table is made from these files alone.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any, Final
+
+from tests.bench.pages import REPOSITORY, machine, told
+
+PAGE: Final = REPOSITORY / "docs" / "first_hour.md"
+FOLDER: Final = REPOSITORY / "docs" / "images" / "first_hour"
+_WIDTH: Final = 1600
+"""Pixels of a sheet."""
+_QUALITY: Final = 80
+_ROWS: Final = (
+    ("First walk: clicks", "first_walk", "clicks"),
+    ("ticks of the wheel", "first_walk", "wheel ticks"),
+    ("seconds that Blender takes for them", "first_walk", "seconds of Blender"),
+    ("Another set-up and its motion: clicks", "setup", "clicks"),
+    ("Route dragged live: drags that the octopus followed", "live_drag", "drags followed"),
+    ("milliseconds of the processor for each", "live_drag", "ms of processor a move"),
+    ("redraws a second", "live_drag", "redraws a second"),
+    ("Clip dropped: clicks", "drop", "clicks"),
+)
+_MARKED: Final = re.compile(r"<!-- figures -->.*?<!-- end of figures -->", re.DOTALL)
+
+
+def keep(folder: Path, language: str) -> Path:
+    """Keep a run that went well, and fill the page; gives the run's file."""
+    import bpy
+
+    sheet: Any = bpy.data.images.load(str(folder / "hour.png"))
+    one: Any = bpy.data.images.load(str(next(folder.glob("first_walk_*.png"))))
+    size = "{}x{}".format(*one.size)
+    width, height = sheet.size
+    sheet.scale(_WIDTH, round(height * _WIDTH / width))
+    name = f"{language}_{size}"
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    sheet.file_format = "JPEG"
+    sheet.save(filepath=str(FOLDER / f"{name}.jpg"), quality=_QUALITY)
+    steps = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    figures = {each["step"]: each["figures"] for each in steps}
+    run = {"language": language, "size": size, "run": machine(), "steps": figures}
+    path = FOLDER / f"{name}.json"
+    path.write_text(json.dumps(run, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    PAGE.write_text(filled(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    return path
+
+
+def runs() -> list[dict[str, Any]]:
+    """Those that are kept, in the order of their names."""
+    paths = sorted(FOLDER.glob("*.json"))
+    return [json.loads(path.read_text(encoding="utf-8")) for path in paths]
+
+
+def block() -> str:
+    """What stands between the page's marks, marks included."""
+    kept = runs()
+    heads = [f"{each['language']}, {each['size'].replace('x', ' × ')}" for each in kept]
+    lines = [["", *heads], ["---"] * (len(kept) + 1)]
+    for words, step, figure in _ROWS:
+        lines.append([words, *(str(each["steps"][step][figure]) for each in kept)])
+    table = "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    said = "\n".join(
+        f"- {head}: {told(each['run'])[:1].lower()}{told(each['run'])[1:]}"
+        for head, each in zip(heads, kept, strict=True)
+    )
+    return f"<!-- figures -->\n\n{table}\n\n{said}\n\n<!-- end of figures -->"
+
+
+def filled(text: str) -> str:
+    """A page with what is between its marks made from the runs that are kept."""
+    return _MARKED.sub(lambda _: block(), text)
