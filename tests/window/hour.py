@@ -144,12 +144,11 @@ def live_drag(hand: Hand, figures: Figures) -> Steps:
     own.live = True
     yield from hand.until(lambda: action_of(octopus()).frame_range[1] == 700, "The live motion")
     yield 2.0
+    with bpy.context.temp_override(window=hand.window, area=hand.area(), region=hand.region()):
+        bpy.ops.view3d.view_selected()
     route = own.route
     select(route)
     yield from hand.over()
-    with bpy.context.temp_override(window=hand.window, area=hand.area(), region=hand.region()):
-        bpy.ops.view3d.view_selected()
-    yield 1.0
     latencies, shown, own_work = [], joints(octopus()), _timed_follow()
     draws, begun = len(hand.draws), time.perf_counter()
     yield from hand.key("G")
