@@ -25,6 +25,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from tests.bench.pages import machine
 from tests.window import kept
 
 HERE = Path(__file__).resolve().parent
@@ -50,7 +51,7 @@ def main(arguments: Sequence[str]) -> int:
     if missing := no_window(words[0]):
         print(f"Not tried in a window: {missing}")
         return 0
-    folder = chosen.folder.resolve()
+    folder, begun = chosen.folder.resolve(), machine()
     shutil.rmtree(folder, ignore_errors=True)
     (folder / "user").mkdir(parents=True)
     environment = {**os.environ, "BLENDER_USER_RESOURCES": str(folder / "user")}
@@ -74,7 +75,7 @@ def main(arguments: Sequence[str]) -> int:
     join(sorted(folder.glob("*.png"), key=os.path.getmtime), folder / "hour.png")
     status = told(folder, ended.returncode)
     if chosen.keep and status == 0:
-        print(f"Kept: {kept.keep(folder, chosen.language)}")
+        print(f"Kept: {kept.keep(folder, chosen.language, begun)}")
     return status
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import sys
 import time
 import traceback
@@ -498,6 +499,8 @@ def main(folder: Path, language: str, names: list[str]) -> None:
     view.show_splash, view.smooth_view = False, 0
     speak(language)
     hand = Hand(folder)
+    seen = {"blender": f"Blender {bpy.app.version_string}", "python": platform.python_version()}
+    (folder / "blender.json").write_text(json.dumps(seen), encoding="utf-8")
     report: list[Figures] = []
 
     def all_steps() -> Steps:

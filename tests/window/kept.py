@@ -10,7 +10,7 @@ import re
 from pathlib import Path
 from typing import Any, Final
 
-from tests.bench.pages import REPOSITORY, machine, told
+from tests.bench.pages import REPOSITORY, told
 
 PAGE: Final = REPOSITORY / "docs" / "first_hour.md"
 FOLDER: Final = REPOSITORY / "docs" / "images" / "first_hour"
@@ -27,11 +27,18 @@ _ROWS: Final = (
     ("redraws a second", "live_drag", "redraws a second"),
     ("Clip dropped: clicks", "drop", "clicks"),
 )
+_SPOKEN: Final = {"en_US": "English", "ja_JP": "Japanese"}
 _MARKED: Final = re.compile(r"<!-- figures -->.*?<!-- end of figures -->", re.DOTALL)
 
 
-def keep(folder: Path, language: str) -> Path:
-    """Keep a run that went well, and fill the page; gives the run's file."""
+def keep(folder: Path, language: str, run: dict[str, Any]) -> Path:
+    """Keep a run that went well, and fill the page; gives the run's file.
+
+    Args:
+        folder: where its pictures and its report are.
+        language: that Blender spoke.
+        run: when and where it began.
+    """
     import bpy
 
     sheet: Any = bpy.data.images.load(str(folder / "hour.png"))
@@ -45,9 +52,11 @@ def keep(folder: Path, language: str) -> Path:
     sheet.save(filepath=str(FOLDER / f"{name}.jpg"), quality=_QUALITY)
     steps = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     figures = {each["step"]: each["figures"] for each in steps}
-    run = {"language": language, "size": size, "run": machine(), "steps": figures}
+    # The Blender that was seen, not the one as a module that looks on.
+    run = run | json.loads((folder / "blender.json").read_text(encoding="utf-8"))
+    whole = {"language": language, "size": size, "run": run, "steps": figures}
     path = FOLDER / f"{name}.json"
-    path.write_text(json.dumps(run, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    path.write_text(json.dumps(whole, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     PAGE.write_text(filled(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
     return path
 
@@ -61,7 +70,10 @@ def runs() -> list[dict[str, Any]]:
 def block() -> str:
     """What stands between the page's marks, marks included."""
     kept = runs()
-    heads = [f"{each['language']}, {each['size'].replace('x', ' × ')}" for each in kept]
+    heads = [
+        f"{_SPOKEN.get(each['language'], each['language'])}, {each['size'].replace('x', ' × ')}"
+        for each in kept
+    ]
     lines = [["", *heads], ["---"] * (len(kept) + 1)]
     for words, step, figure in _ROWS:
         lines.append([words, *(str(each["steps"][step][figure]) for each in kept)])
