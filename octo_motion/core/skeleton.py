@@ -3,13 +3,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
 from .content_cache import content_key
 from .rotations import Floats, conjugate, from_matrix, multiply, rotate
+
+_AGREES: Final = 0.02
+"""Of a factor, within which two bones are too long by the same."""
+_MOST_AGREE: Final = 0.8
+"""Share of the bones with children that agree on it."""
+_FEWEST: Final = 3
+"""Such bones: two may agree by chance."""
+_AS_IT_IS: Final = 0.1
+"""Of a length, by which it may be off without being made up."""
+
+
+def without_made_up_scale(lengths: Floats, heads: Floats, parents: Sequence[int]) -> Floats:
+    """Lengths (bones,) without a factor by which an importer made all bones too long or too short.
+
+    glTF has joints and no tails. Blender's importer lets a bone end where a child begins, but
+    forgets the scale of the armature: of a figure in centimetres all bones are a hundred times as
+    long as the way to the next joint. Where bones do not agree on such a factor, they stay.
+    """
+    below = np.flatnonzero(np.array(parents) >= 0)
+    above = np.array(parents)[below]
+    ways = np.linalg.norm(heads[below] - heads[above], axis=1)
+    there = ways > 1e-6 * max(float(ways.max(initial=0.0)), 1e-12)
+    above, logs = above[there], np.log(lengths[above[there]] / ways[there])
+    carrying = np.unique(above)
+    if len(carrying) < _FEWEST:
+        return lengths
+    agreeing = np.abs(logs[:, None] - logs) < np.log1p(_AGREES)
+    bones = np.zeros((len(carrying), len(logs)), dtype=bool)
+    np.logical_or.at(bones, np.searchsorted(carrying, above), agreeing)
+    shares = bones.mean(axis=0)
+    best = int(np.argmax(shares))
+    factor = float(np.exp(np.median(logs[agreeing[:, best]])))
+    made_up = shares[best] >= _MOST_AGREE and abs(np.log(factor)) > np.log1p(_AS_IT_IS)
+    return lengths / factor if made_up else lengths
 
 
 @dataclass(frozen=True)
@@ -25,7 +61,7 @@ class Skeleton:
     rest_matrices: Floats
     """(bones, 4, 4), armature space; a bone points along its local +Y."""
     lengths: Floats
-    """(bones,)"""
+    """(bones,) as :func:`without_made_up_scale` has them."""
     connected: tuple[bool, ...]
     """Whether a bone's head is fixed to its parent's tail."""
     deform: tuple[bool, ...]

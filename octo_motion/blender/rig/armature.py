@@ -19,7 +19,7 @@ from ...core.errors import RigError, WriteError
 from ...core.locomotion.rig import ArmSkin, arm_skin, joint_positions, nearest_bones
 from ...core.phrases import phrase
 from ...core.rotations import Floats
-from ...core.skeleton import Skeleton
+from ...core.skeleton import Skeleton, without_made_up_scale
 from .. import versions
 
 SUCKER_PROPERTY = "octo_motion_sucker"
@@ -125,20 +125,21 @@ def read_skeleton(armature: bpy.types.Object) -> Skeleton:
             "Add bones, or choose another armature.",
         )
     index = {bone.name: number for number, bone in enumerate(bones)}
-    lengths = np.array([bone.length for bone in bones])
     matrices = np.array([bone.matrix_local for bone in bones], dtype=np.float64)
     if not np.isfinite(matrices).all():
         raise RigError(
             phrase("'{armature}' has bones at undefined positions.", armature=armature.name),
             "Repair its rest pose.",
         )
+    lengths = np.array([bone.length for bone in bones])
+    parents = tuple(index[bone.parent.name] if bone.parent else -1 for bone in bones)
     driven = _driven_bones(armature)
     weighted = {group.name for item in deformed_meshes(armature) for group in item.vertex_groups}
     skeleton = Skeleton(
         names=tuple(bone.name for bone in bones),
-        parents=tuple(index[bone.parent.name] if bone.parent else -1 for bone in bones),
+        parents=parents,
         rest_matrices=matrices,
-        lengths=lengths,
+        lengths=without_made_up_scale(lengths, matrices[:, :3, 3], parents),
         connected=tuple(bone.use_connect for bone in bones),
         deform=tuple(bone.use_deform for bone in bones),
         inherits_rotation=tuple(bone.use_inherit_rotation for bone in bones),

@@ -73,7 +73,7 @@ class LimbReader:
         self.skeleton = read_skeleton(armature)
         self.unit = figure_unit(armature)
         with _at_rest(armature):
-            posed = posed_bones(armature, even_scale(armature))
+            posed = posed_bones(armature, even_scale(armature), self.skeleton)
             skin = skin_points(armature, self.skeleton)
         self._posed = replace(
             posed, heads=posed.heads * self.unit, lengths=posed.lengths * self.unit

@@ -75,7 +75,7 @@ class Puppet:
     def read(self) -> Pose:
         """Where the bodies are, as the armature is shown now."""
         armature = self.armature()
-        posed = posed_bones(armature, even_scale(armature))
+        posed = posed_bones(armature, even_scale(armature), self.rig.skeleton)
         bodies = list(self.rig.roles.bodies)
         pose = Pose(posed.heads[bodies] * self.rig.unit, posed.rotations[bodies])
         self._written = pose
@@ -164,7 +164,7 @@ class Puppet:
         self._carriers = np.array(rig.roles.carriers)
         self._world = np.array(armature.matrix_world)
         object_turn = _object_turn(armature)
-        posed = posed_bones(armature, even_scale(armature))
+        posed = posed_bones(armature, even_scale(armature), self.rig.skeleton)
         turned = multiply(conjugate(object_turn), posed.rotations)
         heads = self._to_armature(armature, posed.heads * rig.unit)
         rest, rest_heads = rig.skeleton.rest_rotations, rig.skeleton.heads

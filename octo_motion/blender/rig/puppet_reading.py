@@ -132,7 +132,7 @@ def read_rig(armature: bpy.types.Object, *, smallest: float = SMALLEST) -> Puppe
             "Set its data to Pose Position (Properties > Data > Skeleton).",
         )
     scale = even_scale(armature)
-    posed = posed_bones(armature, scale)
+    posed = posed_bones(armature, scale, skeleton)
     skin = _read_skin(armature, skeleton)
     facts = RigFacts(
         moved=moved_bones(armature),
@@ -242,7 +242,7 @@ def _scaled(posed: PosedBones, unit: float) -> PosedBones:
     return replace(posed, heads=posed.heads * unit, lengths=posed.lengths * unit)
 
 
-def posed_bones(armature: bpy.types.Object, scale: float) -> PosedBones:
+def posed_bones(armature: bpy.types.Object, scale: float, skeleton: Skeleton) -> PosedBones:
     """All bones as they are shown now, in the world.
 
     Raises:
@@ -263,11 +263,10 @@ def posed_bones(armature: bpy.types.Object, scale: float) -> PosedBones:
     world = np.array(shown.matrix_world, dtype=np.float64)
     turned = world[:3, :3] @ matrices[:, :3, :3]
     sizes = np.linalg.norm(turned, axis=1)
-    rest_lengths = np.array([bone.length for bone in armature_data(armature).bones])
     return PosedBones(
         heads=matrices[:, :3, 3] @ world[:3, :3].T + world[:3, 3],
         rotations=from_matrix(_nearest_rotations(turned)),
-        lengths=rest_lengths * sizes[:, 1],
+        lengths=skeleton.lengths * sizes[:, 1],
         turn=from_matrix(world[:3, :3] / scale),
     )
 

@@ -97,6 +97,47 @@ def pull(session: PuppetSession, bone: str, to: tuple[float, float, float]) -> N
     session.release()
 
 
+# --- Tails that an importer made up ---------------------------------------------------------------
+
+
+def drawn_with_tails(factor: float) -> Any:
+    """A body with two arms whose bones are so many times as long as they should be."""
+    made = rig(
+        hip=("", (0, 0, 0), (0, 0, 0.4)),
+        spine=("hip", (0, 0, 0.4), (0, 0, 0.9)),
+        head=("spine", (0, 0, 0.9), (0, 0, 1.2)),
+        arm_l=("spine", (0.2, 0, 0.9), (0.5, 0, 0.9)),
+        fore_l=("arm_l", (0.5, 0, 0.9), (0.75, 0, 0.9)),
+        hand_l=("fore_l", (0.75, 0, 0.9), (0.95, 0, 0.9)),
+        arm_r=("spine", (-0.2, 0, 0.9), (-0.5, 0, 0.9)),
+        fore_r=("arm_r", (-0.5, 0, 0.9), (-0.75, 0, 0.9)),
+        hand_r=("fore_r", (-0.75, 0, 0.9), (-0.95, 0, 0.9)),
+    )
+    bpy.ops.object.mode_set(mode="EDIT")
+    for bone in made.data.edit_bones:
+        bone.length *= factor
+    bpy.ops.object.mode_set(mode="OBJECT")
+    return made
+
+
+@pytest.mark.parametrize("factor", [0.01, 2.5, 100.0])
+def test_a_hand_is_pulled_alike_whatever_length_an_importer_gave_to_all_bones(
+    factor: float,
+) -> None:
+    turns = []
+    for each in (1.0, factor):
+        armature = drawn_with_tails(each)
+        session = PuppetSession(armature, bpy.context.scene, clock=None)
+        pull(session, "hand_l", (0.7, 0.0, 1.3))
+        session.finish()
+        bpy.context.view_layer.update()
+        turns.append({bone.name: bone.matrix.to_quaternion() for bone in armature.pose.bones})
+    rest = armature.data.bones["hand_l"].matrix_local.to_quaternion()
+    assert turns[0]["hand_l"].rotation_difference(rest).angle > 0.3
+    for name, turn in turns[0].items():
+        assert turn.rotation_difference(turns[1][name]).angle < 2e-3
+
+
 # --- Inheritance -------------------------------------------------------------------------------
 
 

@@ -26,7 +26,7 @@ from ....blender.animation import (
     writable_armature,
     write_action,
 )
-from ....blender.rig import armature_data, bone_and_property, may_play_otherwise, world_matrix
+from ....blender.rig import bone_and_property, may_play_otherwise, read_skeleton, world_matrix
 from ....blender.scene import CARRIED, Contact, put_back, read_route, write_markers
 from ....core.errors import RouteError, WriteError
 from ....core.keyframes import Channel
@@ -277,13 +277,13 @@ class Shot:
             armature = bpy.data.objects.get((self.armature, None))
             if armature is None:
                 return
-            bones = armature_data(armature).bones
+            skeleton = read_skeleton(armature)
             matrices = play_bones(armature, names, moments[done:], _AT_ONCE)
             if len(matrices) == 0:
                 return
             parts.append(
                 [
-                    played_arm(own, bones[arm.bones[-1]].length)
+                    played_arm(own, skeleton.lengths[skeleton.index[arm.bones[-1]]])
                     for arm, own in zip(arms, np.split(matrices, starts, axis=1), strict=True)
                 ]
             )
