@@ -13,12 +13,11 @@ def test_the_page_shows_the_figures_that_are_kept() -> None:
 
 
 def test_the_first_hour_is_kept_in_both_languages_and_on_a_small_screen() -> None:
-    sizes = {(each["language"], each["size"]) for each in kept.runs()}
-    assert sizes >= {
-        (language, size) for language in ("en_US", "ja_JP") for size in ("1600x1000", "1366x768")
-    }
-    for language, size in sizes:
-        name = f"{language}_{size}.jpg"
+    shown = kept.runs()
+    assert {each["language"] for each in shown} >= {"en_US", "ja_JP"}
+    assert {each["size"] for each in shown} >= {"1600x1000", "1366x768"}
+    for each in shown:
+        name = f"{each['language']}_{each['size']}.jpg"
         assert f"images/first_hour/{name}" in TEXT
         assert (kept.FOLDER / name).exists()
 
