@@ -1063,7 +1063,7 @@ def test_a_failure_in_the_middle_cleans_up(
     def fail(*_: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(GaitPoser, "shapes", fail)
+    monkeypatch.setattr(GaitPoser, "shaping", fail)
 
     def work() -> None:
         while operator.modal(window, Press("TIMER")) == {"RUNNING_MODAL"}:
