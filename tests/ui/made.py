@@ -19,6 +19,7 @@ from octo_motion.core.locomotion.motion.pipeline import pose, with_half_frames
 from octo_motion.core.locomotion.motion.segments import Standing, Transitions
 from octo_motion.core.locomotion.path import Route, Travel, TravelSettings, plan_travel
 from octo_motion.core.locomotion.rig import BodyFrame
+from octo_motion.core.rotations import angle_between
 from octo_motion.core.skeleton import Skeleton
 from octo_motion.ui.locomotion.writing import Shot, Summary
 from octo_motion.ui.locomotion.writing import prepare as shot_of
@@ -173,7 +174,8 @@ class Made:
         """Radians per frame against the bone above; the figure TURN is that in the world."""
         measured = self.result.measured
         assert measured is not None
-        return report.change(measured.poses.rotations, measured.frames).value
+        rotations = measured.poses.rotations
+        return report.change(angle_between(rotations[:-1], rotations[1:]), measured.frames).value
 
     @property
     def every(self) -> int:
