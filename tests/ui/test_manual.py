@@ -101,8 +101,7 @@ def test_messages_can_stay_english_in_a_blender_that_speaks_another_language() -
     own = SimpleNamespace(layout=Layout())
     preferences.OCTO_MOTION_AP_preferences.draw(cast("Any", own), bpy.context)
     assert "use_translate_reports" in said
-    view: Any = cast("Any", bpy.context.preferences).view
-    assert hasattr(view, "use_translate_reports")
+    assert "use_translate_reports" in bpy.types.PreferencesView.bl_rna.properties
 
 
 def test_without_a_window_preferences_count_for_nothing() -> None:
