@@ -19,6 +19,7 @@ from octo_motion.blender.scene.octopus import add_octopus
 from octo_motion.core.locomotion.octopus.rig import arm_bone_names
 from octo_motion.core.locomotion.octopus.shape import OctopusShape
 from octo_motion.core.rotations import Floats
+from tests.ui.rig import bind_skin
 
 ARMS = arm_bone_names(8, 12)
 
@@ -80,15 +81,7 @@ def square(armature: Any, half: float) -> Any:
                 (low + side, low + (side + 1) % 4, low + 4 + (side + 1) % 4, low + 4 + side)
                 for side in range(4)
             ]
-    mesh = bpy.data.meshes.new("Skin")
-    mesh.from_pydata(points, [], faces)
-    skin: Any = bpy.data.objects.new("Skin", mesh)
-    bpy.context.scene.collection.objects.link(skin)
-    for name, numbers in groups.items():
-        skin.vertex_groups.new(name=name).add(numbers, 1.0, "REPLACE")
-    skin.parent = armature
-    skin.modifiers.new("Armature", "ARMATURE").object = armature
-    return skin
+    return bind_skin(armature, points, groups, faces)
 
 
 def test_a_cage_is_not_the_surface_that_it_makes() -> None:

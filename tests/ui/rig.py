@@ -14,6 +14,24 @@ from octo_motion.ui.declared_settings import plain
 ROUTE = ((0.0, 0.0, 0.0), (0.0, -2.0, 0.0), (1.0, -3.0, 0.5), (3.0, -3.0, 0.5))
 
 
+def bind_skin(
+    armature: Any,
+    points: Sequence[Any],
+    groups: Mapping[str, list[int]],
+    faces: Sequence[tuple[int, ...]] = (),
+) -> Any:
+    """A mesh that an armature deforms, each point by one bone alone."""
+    mesh = bpy.data.meshes.new("Skin")
+    mesh.from_pydata(points, [], faces)
+    skin: Any = bpy.data.objects.new("Skin", mesh)
+    bpy.context.scene.collection.objects.link(skin)
+    for name, numbers in groups.items():
+        skin.vertex_groups.new(name=name).add(numbers, 1.0, "REPLACE")
+    skin.parent = armature
+    skin.modifiers.new("Armature", "ARMATURE").object = armature
+    return skin
+
+
 def make_octopus(
     name: str = "Octopus", *, arms: int = 4, joints: int = 6, length: float = 1.0
 ) -> Any:

@@ -12,7 +12,7 @@ from tests.referee.recording import moments, record
 from tests.referee.scenes import build
 from tests.referee.surface import Surface
 from tests.ui.made import prepare
-from tests.ui.rig import click, generate, keys, make_octopus
+from tests.ui.rig import bind_skin, click, generate, keys, make_octopus
 
 _THICK = 0.05
 _ROUND = 12
@@ -34,14 +34,7 @@ def skinned(askew: float) -> Any:
                 ring = np.cos(angle) * up + np.sin(angle) * np.cross(along, up)
                 groups.setdefault(bone.name, []).append(len(points))
                 points.append(head + share * (tail - head) + _THICK * (ring + askew * up))
-    mesh = bpy.data.meshes.new("Skin")
-    mesh.from_pydata(points, [], [])
-    skin: Any = bpy.data.objects.new("Skin", mesh)
-    bpy.context.scene.collection.objects.link(skin)
-    for name, numbers in groups.items():
-        skin.vertex_groups.new(name=name).add(numbers, 1.0, "REPLACE")
-    skin.parent = armature
-    skin.modifiers.new("Armature", "ARMATURE").object = armature
+    bind_skin(armature, points, groups)
     bpy.context.view_layer.objects.active = armature
     click("detect_arms")
     click("add_route")
