@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How fast splices are built, from the button to the action, and how fast a drag follows the mouse.
+"""How fast splices are built and clips retargeted, from the button to the action, and how fast a drag
+follows the mouse.
 
 A body of 65 bones, fingers included, all of them moving, gets the legs of another one with their
-travel, its right arm and its head. Each measurement has a process of its own.
+travel, its right arm and its head; then all of it. Each measurement has a process of its own.
 """
 
 from __future__ import annotations
@@ -49,6 +50,8 @@ class Result:
     """Peak of the process, Blender itself included."""
     drag: dict[str, tuple[float, float]]
     """Milliseconds of a mouse move by part: the median, and the slowest."""
+    retarget: tuple[float, float]
+    """Seconds from the button **Retarget Clip** to a new action, and the processor's."""
 
 
 def measure(repeat: int = 2) -> list[Measured]:
@@ -76,6 +79,15 @@ def text(results: Any) -> str:
     ]
     lines += ["", *parts_lines(results[-1]), ""]
     lines += [
+        "The whole clip retargeted: all parts, travel, foot lock",
+        f"{'frames':>8} {'seconds':>9} {'processor':>10}",
+    ]
+    lines += [
+        f"{each['frames']:>8} {each['retarget'][0]:>9.2f} {each['retarget'][1]:>10.2f}"
+        for each in results
+    ]
+    lines += [
+        "",
         f"A move of the mouse while a timing is dragged, {results[0]['frames']} frames",
         f"{'part':>20} {'median ms':>10} {'slowest':>9}",
     ]
@@ -206,9 +218,19 @@ def _run(frames: int) -> Result:
     operators.splice_build()
     again = time.perf_counter() - start
     drag = {part: _dragged(hero, part) for part in _DRAGGED}
-    return Result(
-        *(frames, len(hero.data.bones), seconds, cpu, again), parts, peak_megabytes(), drag
-    )
+    bones, peak = len(hero.data.bones), peak_megabytes()
+    return Result(frames, bones, seconds, cpu, again, parts, peak, drag, _retargeted(hero, source))
+
+
+def _retargeted(hero: Any, source: Any) -> tuple[float, float]:
+    """Seconds of the whole clip onto the body, and the processor's."""
+    import bpy
+
+    operators: Any = bpy.ops.octo_motion
+    bpy.context.view_layer.objects.active = hero
+    cpu, start = time.process_time(), time.perf_counter()
+    operators.retarget(source=source.name)
+    return time.perf_counter() - start, time.process_time() - cpu
 
 
 def _dragged(hero: Any, part: str) -> tuple[float, float]:
