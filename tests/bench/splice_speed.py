@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How fast splices are built and clips retargeted, from the button to the action, and how fast a drag
-follows the mouse.
+"""How fast splices are built and clips retargeted, from the button to the action, and how fast a
+drag follows the mouse.
 
 A body of 65 bones, fingers included, all of them moving, gets the legs of another one with their
 travel, its right arm and its head; then all of it. Each measurement has a process of its own.

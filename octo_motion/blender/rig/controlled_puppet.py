@@ -8,6 +8,7 @@ limbs stand as the puppet does.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Final
 
 import bpy
@@ -17,9 +18,20 @@ from mathutils import Matrix, Vector
 from ...core.errors import WriteError
 from ...core.phrases import phrase
 from ...core.posing.control_fit import ControlFit
-from ...core.posing.puppet import SIZE, Pose, closed, turned_bodies
-from ...core.rotations import Floats, conjugate, rotate
-from .controls import Channels, Reach, control_names, hangs_on, reaches
+from ...core.posing.puppet import Pose, turned_bodies
+from ...core.rotations import Floats, angle_between
+from .armature import even_scale
+from .controls import (
+    BoneValues,
+    Channels,
+    Reach,
+    bone_values,
+    control_names,
+    hangs_on,
+    reaches,
+    set_bone_values,
+)
+from .limb_points import LimbPoints
 from .puppet import Puppet
 from .puppet_reading import PuppetRig, bent_bones
 
@@ -29,10 +41,8 @@ _TOLD: Final = 4e-4
 """Of the figure's size: what is farther off is told, a millimetre on a body."""
 _MOVED: Final = 3e-4
 """Of the figure's size: a limb that has gone by more is to move."""
-_TWIST: Final = 0.01
-"""Of a limb's length, beside it: how much its twist counts against its place."""
-
-
+_SAME_POSE: Final = 1e-6
+"""Puppet metres and radians: poses that are no farther apart are one."""
 _SAME: Final = 0.01
 """Of the figure's size: joints closer than this are the same joint."""
 _FAR: Final = 0.02
@@ -43,8 +53,16 @@ _CARRIED: Final = 1e-3
 """How much a limb counts at first that is carried by others and not turned itself."""
 _AGAIN: Final = 15
 """Of how many poses that are written one looks for controls that are to move as well."""
-_WIDE: Final = 3
-"""From this stage of settling on, whatever moves a limb is taken, by its place too."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Stood:
+    """A pose, and how the controls showed it."""
+
+    pose: Pose
+    values: dict[str, BoneValues]
+    told: str
+    """What of it they could not show."""
 
 
 class ControlledPuppet(Puppet):
@@ -67,17 +85,22 @@ class ControlledPuppet(Puppet):
         self._trunk = rig.roles.parents.index(-1)
         self._leading: set[str] = set()
         """Controls that lead inverse kinematics by their place, and carry nothing beside."""
-        self._size = SIZE / rig.unit
-        bones = armature.data.bones  # type: ignore[union-attr]
-        self._numbers = np.array([bones.find(each) for each in names])
+        self._points = LimbPoints(rig, armature)
+        self._size = self._points.size
         self._goal = rig.pose
-        self._begin(armature, rig.pose)
+        self.read()
 
     # --- What is shown --------------------------------------------------------------------------
 
     def read(self) -> Pose:
+        armature = self.armature()
+        assert armature.pose is not None
+        bones = armature.pose.bones
+        self._origins = {name: Channels(bones[name]) for name in self._limbs}
+        self._stood: list[_Stood] = []
         pose = super().read()
-        self._begin(self.armature(), pose)
+        self._go_on(pose)
+        self._keep("")
         return pose
 
     def write(self, pose: Pose) -> list[str]:
@@ -89,36 +112,42 @@ class ControlledPuppet(Puppet):
             self._weights = self._weigh(turned)
             self._take(self._narrow(turned), placed=False)
         if self._fit is not None:
-            self._fit.step(self._points_of(pose))
+            self._fit.step(self._points.of(pose))
         return [each.name for each in self._moving]
 
     def settle(self) -> str:
-        goal, hard = self._points_of(self._goal), 6 * len(self.figure)
+        known = self._stood_before()
+        if known is not None:
+            bones = self.armature().pose.bones  # type: ignore[union-attr]
+            for name, values in known.values.items():
+                set_bone_values(bones[name], values)
+            self._go_on(self._goal)
+            return known.told
+        goal = self._points.of(self._goal)
         wanted = self._turned()
         if wanted:
             self._aim(goal)
         off = self._misses(goal)
-        # First what has been bent, then what does not go along by itself, then whatever there is.
-        for stage in range(_WIDE + 1):
-            if off.max() <= (_CLOSE if stage == 0 else _TOLD):
-                return ""
-            missed = set(np.flatnonzero(off > _TOLD).tolist())
-            wanted |= missed if stage > 1 else set()
-            names = self._narrow(wanted) if stage < _WIDE else self._wide(missed | self._turned())
-            self._weights = self._weigh(wanted if stage == 0 else None)
-            self._take(names, placed=stage >= _WIDE, anew=stage == 1)
+        # First what has been bent, then what does not go along by itself.
+        for close in (_CLOSE, _TOLD):
+            if off.max() <= close:
+                break
+            self._weights = self._weigh(None)
+            self._take(self._wide(wanted), placed=True, anew=True)
+            wanted |= set(np.flatnonzero(off > _TOLD).tolist())
             if self._fit is not None:
-                self._fit.settle(goal, hard, _CLOSE)
+                self._fit.settle(goal, self._points.hard, _CLOSE, _TOLD)
             off = self._misses(goal)
-        if off.max() <= _TOLD:
-            return ""
-        body = int(np.argmax(off))
-        far = float(off.max()) * self._size
-        return phrase(
-            "{name} is {far:.3g} off: its controls do not reach",
-            name=self.figure.names[body],
-            far=far,
-        )
+        told, body = "", int(np.argmax(off))
+        if off[body] > _TOLD:
+            told = phrase(
+                "{name} is {far:.3g} off: its controls do not reach",
+                name=self.figure.names[body],
+                far=float(off[body]) * self._size,
+            )
+        self._keep(told)
+        self._go_on(self._goal)
+        return told
 
     def local(self, pose: Pose) -> tuple[Floats, Floats]:  # noqa: ARG002
         """Of bones that something else moves no rotation could be recorded.
@@ -157,47 +186,32 @@ class ControlledPuppet(Puppet):
 
     # --- Inside -----------------------------------------------------------------------------------
 
-    def _begin(self, armature: bpy.types.Object, pose: Pose) -> None:
-        """Go on from what is shown now."""
-        assert armature.pose is not None
-        bones = armature.pose.bones
-        self._origins = {name: Channels(bones[name]) for name in self._limbs}
+    def _go_on(self, pose: Pose) -> None:
+        """Go on from what is shown now, which is the pose from now on, as near as it is."""
+        armature = self.armature()
         self._base = self._goal = pose
         self._fit: ControlFit | None = None
         self._moving: list[Channels] = []
         self._placed = False
         self._writes = 0
-        self._weights = np.ones(9 * len(self.figure))
-        self._start = self._shown(armature).reshape(-1, 3)
-        self._find_reaches(armature)
-        heads, ends, sides = self._start.reshape(3, -1, 3)
-        back = conjugate(pose.orientations)
-        self._ends = rotate(back, (ends - heads) * self._size)
-        self._sides = rotate(back, (sides - heads) * self._size)
-        self._off = heads * self._size - closed(self.figure, pose).positions / self.rig.unit
+        self._weights = np.ones(0)
+        self._start = self._points.shown(armature).reshape(-1, 3)
+        self._points.match(armature, pose, self._find_reaches(armature))
 
-    def _points_of(self, pose: Pose) -> Floats:
-        """Heads, ends and sides (numbers,) of the limbs in a pose, in sizes of the figure."""
-        pose = closed(self.figure, pose)
-        heads = pose.positions / self.rig.unit + self._off
-        ends = heads + rotate(pose.orientations, self._ends)
-        sides = heads + rotate(pose.orientations, self._sides)
-        return np.stack([heads, ends, sides]).ravel() / self._size
+    def _keep(self, told: str) -> None:
+        """Remember which values of the controls the pose is shown by."""
+        bones = self.armature().pose.bones  # type: ignore[union-attr]
+        values = {name: bone_values(bones[name]) for name in self._limbs}
+        self._stood.append(_Stood(self._goal, values, told))
 
-    def _shown(self, armature: bpy.types.Object) -> Floats:
-        """The same, as Blender shows it."""
-        shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
-        assert shown.pose is not None
-        buffer = np.empty(16 * len(shown.pose.bones), dtype=np.float32)
-        shown.pose.bones.foreach_get("matrix", buffer)
-        matrices = buffer.reshape(-1, 4, 4).transpose(0, 2, 1)[self._numbers].astype(np.float64)
-        world = np.array(shown.matrix_world, dtype=np.float64)
-        heads = matrices[:, :3, 3]
-        lengths = self.rig.skeleton.lengths[list(self.rig.roles.bodies)][:, None]
-        ends = heads + lengths * matrices[:, :3, 1]
-        sides = heads + _TWIST * lengths * matrices[:, :3, 0]
-        points = np.stack([heads, ends, sides]) @ world[:3, :3].T + world[:3, 3]
-        return points.ravel() / self._size
+    def _stood_before(self) -> _Stood | None:
+        """How the pose was shown before, if it was: what is undone leaves no trace."""
+        for each in reversed(self._stood):
+            apart = np.abs(each.pose.positions - self._goal.positions).max()
+            turned = angle_between(each.pose.orientations, self._goal.orientations).max()
+            if max(apart, turned) < _SAME_POSE:
+                return each
+        return None
 
     def _aim(self, goal: Floats) -> None:
         """Bring goals and poles of inverse kinematics to where the limbs want them, about.
@@ -206,7 +220,7 @@ class ControlledPuppet(Puppet):
         """
         armature = self.armature()
         assert armature.pose is not None
-        bones, now = armature.pose.bones, self._shown(armature).reshape(-1, 3) * self._size
+        bones, now = armature.pose.bones, self._points.shown(armature).reshape(-1, 3) * self._size
         for reach, joints in self._reaches:
             before, after = (
                 self._start[joints] * self._size,
@@ -227,12 +241,16 @@ class ControlledPuppet(Puppet):
                     bones[name].matrix = matrix
             self._fit, self._moving = None, []
 
-    def _find_reaches(self, armature: bpy.types.Object) -> None:
-        """Of chains of inverse kinematics: at which joints theirs are, and what leads them."""
+    def _find_reaches(self, armature: bpy.types.Object) -> list[tuple[int, int]]:
+        """Of chains of inverse kinematics: at which joints theirs are, and what leads them.
+
+        Returns the bodies at their ends, and the bones that are their targets.
+        """
         shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
         assert shown.pose is not None
         bones, world = shown.pose.bones, shown.matrix_world
         points = self._start[: 2 * len(self.figure)] * self._size
+        led_bodies: list[tuple[int, int]] = []
         self._reaches: list[tuple[Reach, list[int]]] = []
         self._poles: dict[str, Floats] = {}
         self._leads: dict[str, Matrix] = {}
@@ -245,6 +263,9 @@ class ControlledPuppet(Puppet):
                 continue
             joints = apart.argmin(axis=1).tolist()
             self._reaches.append((reach, joints))
+            ends = apart[2, : len(self.figure)]
+            if reach.goal and ends.min() <= _SAME * self._size:
+                led_bodies.append((int(ends.argmin()), bones.find(reach.goal)))
             above = self.figure.parents[joints[0] % len(self.figure)]
             led = self._needs.get(reach.goal, set()) | self._needs.get(reach.pole, set())
             self._leading |= {
@@ -253,6 +274,7 @@ class ControlledPuppet(Puppet):
             for name in {reach.goal, reach.pole} & set(self._limbs):
                 self._leads[name] = bones[name].matrix.copy()
                 self._poles[name] = np.array(world @ bones[name].head)
+        return led_bodies
 
     def _turned(self) -> set[int]:
         """Bodies that are turned against what they hang on since the bones were read."""
@@ -260,8 +282,8 @@ class ControlledPuppet(Puppet):
 
     def _misses(self, goal: Floats) -> Floats:
         """(bodies,) how far each limb is from where it is wanted, in sizes of the figure."""
-        now = self._shown(self.armature())
-        apart = np.linalg.norm((now - goal).reshape(3, -1, 3)[:2], axis=2)
+        now = self._points.shown(self.armature())
+        apart = np.linalg.norm(self._points.limbs_of(now - goal), axis=2)
         return apart.max(axis=0)
 
     def _weigh(self, wanted: set[int] | None) -> Floats:
@@ -270,15 +292,22 @@ class ControlledPuppet(Puppet):
         if wanted is not None:
             carried = np.flatnonzero(self._way() > _MOVED).tolist()
             weights[:, [each for each in carried if each not in wanted]] = _CARRIED
-        return weights.ravel()
+        return np.concatenate([weights.ravel(), np.ones(3 * len(self._points.targets))])
 
     def _way(self) -> Floats:
         """(bodies,) how far each limb is to go, in sizes of the figure."""
-        before, after = self._points_of(self._base), self._points_of(self._goal)
-        return np.linalg.norm((after - before).reshape(3, -1, 3)[:2], axis=2).max(axis=0)
+        before, after = self._points.of(self._base), self._points.of(self._goal)
+        way = self._points.limbs_of(after - before)
+        return np.linalg.norm(way, axis=2).max(axis=0)
 
     def _wide(self, wanted: set[int]) -> list[str]:
-        return [name for name, limbs in self._limbs.items() if limbs & wanted]
+        """Controls on which these bodies hang, and those that lead others that have been moved."""
+        moved = set(np.flatnonzero(self._way() > _MOVED).tolist()) | wanted
+        return [
+            name
+            for name, limbs in self._limbs.items()
+            if limbs & (moved if name in self._leading else wanted)
+        ]
 
     def _narrow(self, wanted: set[int]) -> list[str]:
         """Controls of bodies on which nothing hangs that is to stay where it is."""
@@ -307,24 +336,33 @@ class ControlledPuppet(Puppet):
             )
             for name in names
         ]
-        count = sum(each.count for each in self._moving)
-        moves = np.zeros((count, 3, len(self.figure), 3), dtype=bool)
+        counts = [each.count for each in self._moving]
+        count = sum(counts)
+        self._fit = None
+        if not count:
+            return
+        limbs = np.zeros((count, 3, len(self.figure), 3), dtype=bool)
+        targets = [bones[bone].name for bone in self._points.targets]
+        led = np.zeros((count, len(targets), 3), dtype=bool)
         start = 0
         for each in self._moving:
-            moves[start : start + each.count, :, sorted(self._limbs[each.name])] = True
+            rows = slice(start, start + each.count)
+            limbs[rows, :, sorted(self._limbs[each.name])] = True
+            led[rows] = [[each.name in self._needs[target]] * 3 for target in targets] or False
             start += each.count
-        flat = moves.reshape(count, -1)
-        self._fit = ControlFit(self._shape, np.zeros(count), self._weights, flat) if count else None
+        moves = np.concatenate([limbs.reshape(count, -1), led.reshape(count, -1)], axis=1)
+        self._fit = ControlFit(self._shape, counts, self._weights, moves)
 
     def _shape(self, values: Floats) -> Floats:
         armature = self.armature()
         assert armature.pose is not None
-        start = 0
+        # Bones go in the armature's own space.
+        start, own_size = 0, self._size / even_scale(armature)
         for each in self._moving:
             bone = armature.pose.bones[each.name]
-            each.write(bone, values[start : start + each.count], self._size)
+            each.write(bone, values[start : start + each.count], own_size)
             start += each.count
-        return self._shown(armature)
+        return self._points.shown(armature)
 
 
 def _swivelled(place: Floats, before: Floats, after: Floats, size: float) -> Floats:

@@ -16,13 +16,22 @@ import bpy
 import numpy as np
 from mathutils import Quaternion, Vector
 
-from ...core.rotations import Floats
+from ...core.rotations import Floats, angle_between, conjugate, multiply
 from .armature import armature_data, driven_channels, set_rotation
 
 _MECHANISM: Final = re.compile(r"(DEF|ORG|MCH|VIS)-|.*tweak", re.IGNORECASE)
 """Names of bones that are no controls, or that only correct what others do."""
 _READ_BONE: Final = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]')
 _FULL: Final = 1.0 - 1e-6
+_TRIED: Final = 0.1
+"""Radians, and shares of the rig's length, by which controls are moved to see what they bend."""
+_TRIES: Final = 3
+_STIFF: Final = 0.02
+"""Share of that by which a joint that no control bends may seem to bend: inverse kinematics leave
+that much open."""
+
+BoneValues = dict[str, tuple[float, ...]]
+"""Of a bone's channels, by name."""
 
 
 def hangs_on(armature: bpy.types.Object) -> dict[str, set[str]]:
@@ -177,6 +186,61 @@ def is_shown(bone: bpy.types.PoseBone) -> bool:
         return False
     collections = bone.bone.collections
     return not collections or any(each.is_visible_effectively for each in collections)
+
+
+def stiff_joints(armature: bpy.types.Object, joints: Mapping[str, str], size: float) -> set[str]:
+    """Of bones by the one that they are to bend against, those that none of the controls bends.
+
+    All controls are moved at random, a few times, and put back as they were.
+
+    Args:
+        armature: that can be posed.
+        joints: the bone above by bone.
+        size: of the rig in the armature's own space.
+    """
+    assert armature.pose is not None
+    needs = hangs_on(armature)
+    names = control_names(armature, set().union(*(needs[each] for each in joints)))
+    bones = [armature.pose.bones[each] for each in names]
+    values = [bone_values(each) for each in bones]
+    channels = [Channels(each) for each in bones]
+    random = np.random.default_rng(1)
+    before = _bends(armature, joints)
+    most = np.zeros(len(joints))
+    for _ in range(_TRIES):
+        for bone, each in zip(bones, channels, strict=True):
+            each.write(bone, random.uniform(-_TRIED, _TRIED, each.count), size)
+        turned = angle_between(_bends(armature, joints), before)
+        most = np.maximum(most, turned)
+    for bone, kept in zip(bones, values, strict=True):
+        set_bone_values(bone, kept)
+    _bends(armature, joints)
+    return {bone for bone, angle in zip(joints, most, strict=True) if angle < _STIFF * _TRIED}
+
+
+def bone_values(bone: bpy.types.PoseBone) -> BoneValues:
+    """Where a bone goes and how it turns, in all of its rotation modes."""
+    channels = "location", "rotation_quaternion", "rotation_axis_angle", "rotation_euler"
+    return {each: tuple(getattr(bone, each)) for each in channels}
+
+
+def set_bone_values(bone: bpy.types.PoseBone, values: BoneValues) -> None:
+    """Let a bone be as it was, to the last bit."""
+    for channel, value in values.items():
+        setattr(bone, channel, value)
+
+
+def _bends(armature: bpy.types.Object, joints: Mapping[str, str]) -> Floats:
+    """Orientations (joints, 4) of bones seen from those above, as Blender shows them."""
+    shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    assert shown.pose is not None
+    bones = shown.pose.bones
+    pairs = [
+        [np.array(bones[each].matrix.to_quaternion()) for each in (bone, above)]
+        for bone, above in joints.items()
+    ]
+    turned = np.array(pairs, dtype=np.float64)
+    return multiply(conjugate(turned[:, 1]), turned[:, 0])
 
 
 class Channels:

@@ -44,7 +44,7 @@ from .armature import (
     read_skeleton,
     vertex_positions,
 )
-from .controls import control_names, goal_bones, hangs_on, ik_chain, reaches
+from .controls import control_names, goal_bones, hangs_on, ik_chain, reaches, stiff_joints
 
 MARK: Final = "octo_motion_puppet"
 """Custom property of a bone: "BODY" or "FOLLOW", where the artist has decided it."""
@@ -70,6 +70,8 @@ _SAME_JOINT: Final = 0.01
 _STRAIGHT_LIMB: Final = 1e-3
 _OWN_AXIS: Final = 0.95
 """Cosine from which on a joint bends about an axis of its own."""
+_LEAST_BENT: Final = 0.08
+"""Radians from straight, to which a knee stretches that inverse kinematics bend."""
 _MOST_BENT: Final = 2.7
 """Radians from straight, to which a knee bends."""
 _TOGETHER: Final = 0.01
@@ -193,6 +195,7 @@ def _roles(
         roles, lost = None, sorted(facts.moved)
     found = find_roles(skeleton, controlled, armature.name) if lost else None
     if found is not None:
+        found = _bending(armature, skeleton, controlled, found)
         limbs = {skeleton.names[each] for each in found.bodies}
         carried = {
             skeleton.names[above] for each in found.bodies for above in skeleton.ancestors(each)
@@ -201,6 +204,26 @@ def _roles(
         if control_names(armature, beside):
             return found, {name: frozenset(needs[name]) for name in limbs}
     return roles or find_roles(skeleton, facts, armature.name), {}
+
+
+def _bending(
+    armature: bpy.types.Object, skeleton: Skeleton, facts: RigFacts, roles: Roles
+) -> Roles:
+    """The roles without the bodies at whose joints no control bends the rig: parts of others."""
+    names = [skeleton.names[each] for each in roles.bodies]
+    joints = {
+        name: names[parent]
+        for name, parent in zip(names, roles.parents, strict=True)
+        if parent >= 0
+    }
+    if not joints:
+        return roles
+    size = float(np.ptp(skeleton.heads, axis=0).max())
+    stiff = stiff_joints(armature, joints, size)
+    if not stiff:
+        return roles
+    marks = dict.fromkeys(sorted(stiff), FOLLOW) | dict(facts.marks)
+    return find_roles(skeleton, replace(facts, marks=marks), armature.name)
 
 
 def _carriers(name: str, needs: Mapping[str, set[str]], bent: frozenset[str]) -> frozenset[str]:
@@ -438,7 +461,8 @@ def _hinges(armature: bpy.types.Object, skeleton: Skeleton, roles: Roles) -> dic
         number = int(np.argmax(np.abs(own)))
         if apart.min() > near or number == 1 or abs(own[number]) < _OWN_AXIS:
             continue
-        least, most = -bent, _MOST_BENT - bent
+        # Of a straight limb nothing would tell to which side it bends again.
+        least, most = min(_LEAST_BENT - bent, 0.0), _MOST_BENT - bent
         wanted = (least, most) if own[number] > 0.0 else (-most, -least)
         still = (0.0, 0.0)
         found[skeleton.names[body]] = JointLimits(

@@ -71,6 +71,8 @@ class PosedPuppet:
         self.measuring: MeasuringHand | None = None
         self.warning = ""
         """What is wrong with the scene, and keeps nobody from posing."""
+        self.missed = ""
+        """What of the last drag the rig's controls cannot give, if it is posed through these."""
         self._scene = scene.session_uid
         figure = self.puppet.figure
         self.core = SharedSession(
@@ -220,6 +222,7 @@ class PosedPuppet:
     def _take(self, body: int, point: Floats) -> HandSpring:
         """Take hold with one more hand, and with one on the other side where that is wanted."""
         spring = self.core.grab(body, point)
+        self.missed = ""
         self.traces.begin()
         if posing_settings(self.puppet.armature()).mirror:
             self.other_side.take(spring)
@@ -334,8 +337,6 @@ class KeyedPuppet(PosedPuppet):
         super().__init__(armature, scene, clock, partners)
         self.companions = Companions(self.puppet)
         settings: Any = posing_settings(armature)
-        self.missed = ""
-        """What of the pose the rig's controls cannot give, if it is posed through these."""
         self.keys = PoseKeys(armature, settings.keys_to, settings.action, blend=settings.key_blend)
 
     def key(self, *, all_bones: bool = False, bones: Iterable[str] | None = None) -> list[str]:
@@ -369,7 +370,7 @@ class KeyedPuppet(PosedPuppet):
 
     def settle(self) -> None:
         """Let the bones show the pose that the figure has."""
-        self.missed = self.puppet.settle()
+        self.missed = self.puppet.settle() or self.missed
 
     def _touched(self) -> list[int]:
         """Bodies that are keyed; what no eye sees of others is put back."""
@@ -496,6 +497,8 @@ class PuppetSession(RecordedPuppet):
         self.traces.stood(self._frame, self.core.pose)
         self.ended = False
         """Whether it is over."""
+        self._moving = False
+        """Whether what the bones show is on its way."""
         self.report: TickReport | None = None
         self._trouble: OctoMotionError | None = None
         self._one_thread = OneThread()
@@ -572,6 +575,10 @@ class PuppetSession(RecordedPuppet):
             self.traces.add(next(iter(held.values())).position / self.unit, point)
         if not self.report.resting:
             self.puppet.write(self.core.pose)
+            self._moving = True
+        elif self._moving:
+            self._moving = False
+            self.settle()
         return self.report
 
     def measure(self, body: int) -> None:
@@ -600,8 +607,7 @@ class PuppetSession(RecordedPuppet):
     def restore(self) -> None:
         """Back to the pose at the start; keys stay."""
         self.core.restore()
-        self.puppet.write(self.core.pose)
-        self.settle()
+        self._stepped(done=True)
 
     def step_back(self) -> bool:
         """Back to before the last grab; whether there was one."""
@@ -613,6 +619,7 @@ class PuppetSession(RecordedPuppet):
 
     def _stepped(self, done: bool) -> bool:  # noqa: FBT001 - what has come of the step
         if done:
+            self.missed = ""
             self.puppet.write(self.core.pose)
             self.settle()
         return done

@@ -217,3 +217,42 @@ def test_escape_gives_the_controls_back() -> None:
     session.cancel()
     after = [np.array(each.matrix_basis) for each in armature.pose.bones]
     assert np.array_equal(before, after)
+
+
+def test_a_drag_that_is_taken_back_leaves_no_trace_in_the_controls() -> None:
+    armature = by_goal_and_pole()
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+
+    def values() -> Floats:
+        return np.array([each.matrix_basis for each in armature.pose.bones])
+
+    before = values()
+    drag(session, "shin", (0.1, -0.25, 0.2))
+    for _ in range(120):
+        session.tick(TICK)
+    after = values()
+    assert np.abs(after - before).max() > 0.05
+    assert session.step_back()
+    assert np.array_equal(values(), before)
+    assert session.key() == []
+    assert session.step_forward()
+    assert np.array_equal(values(), after)
+    session.cancel()
+
+
+@pytest.mark.parametrize("scale", [0.01, 100.0])
+def test_controls_of_a_scaled_object_are_led_as_those_of_one_that_is_not(scale: float) -> None:
+    found = []
+    for each in (1.0, scale):
+        armature = by_goal_and_pole()
+        armature.scale = (each,) * 3
+        bpy.context.view_layer.update()
+        session = PuppetSession(armature, bpy.context.scene, clock=None)
+        session.core.change(step=4e-3)
+        drag(session, "shin", (0.1 * each, -0.25 * each, 0.2 * each))
+        session.key()
+        assert session.missed == ""
+        session.finish()
+        found.append(joints(armature, "") / each)
+    # As far as inverse kinematics leave open.
+    assert np.linalg.norm(found[1] - found[0], axis=2).max() < 3.0 * MILLIMETRE
