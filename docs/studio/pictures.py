@@ -23,6 +23,7 @@ import puppet_curves
 import puppet_things
 import puppets
 import reaching
+import rigify_person
 import setups
 import shots
 import stage
@@ -199,6 +200,7 @@ PICTURES: Final[dict[str, Callable[[], Pixels]]] = {
     "pose_octopus": puppets.octopus,
     "pose_doll": puppets.doll,
     "pose_things": puppet_things.sheet,
+    "pose_rigify": rigify_person.picture,
     "puppet_plots": puppet_plots,
     "splices": splices,
     "follow_braid": following.braid,

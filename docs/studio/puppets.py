@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -64,7 +64,7 @@ def octopus() -> Pixels:
         Pull("arm1.10.L", (0.10, 0.26, 0.34)),
         Pull("arm1.11.R", (-0.22, 0.24, 0.16)),
     )
-    return _sheet(figure, pulls, np.array([0.25, 0.85, -0.38]))
+    return sheet(figure, pulls, np.array([0.25, 0.85, -0.38]))
 
 
 def doll() -> Pixels:
@@ -77,13 +77,21 @@ def doll() -> Pixels:
         Pull("shin.R", (-0.02, -0.55, 0.45), seconds=1.2),
         Pull("head", (0.04, -0.06, -0.02), turn=60.0),
     )
-    return _sheet(figure, pulls, np.array([-0.45, 0.85, -0.16]), shown=2)
+    return sheet(figure, pulls, np.array([-0.45, 0.85, -0.16]), shown=2)
 
 
-def _sheet(
-    figure: bpy.types.Object, pulls: Sequence[Pull], forward: Points, *, shown: int | None = None
+def sheet(
+    figure: bpy.types.Object,
+    pulls: Sequence[Pull],
+    forward: Points,
+    *,
+    shown: int | None = None,
+    keyed: Callable[[bpy.types.Object, list[str]], None] | None = None,
 ) -> Pixels:
-    """Before, at the end of each of the first pulls, and after all of them."""
+    """Before, at the end of each of the first pulls, and after all of them.
+
+    What has got keys then is shown beside by ``keyed``, if that is given.
+    """
     figure.show_in_front = False
     scene = stage.the_scene()
     stage.set_light(scene)
@@ -109,10 +117,13 @@ def _sheet(
         session.release()
         for _ in range(30):
             session.tick(_TICK)
+    names = [] if keyed is None else session.key()
     session.finish()
     bpy.context.view_layer.update()
     points.append(stage.skin_points(figure, [1]))
     pictures.take("let go")
+    if keyed is not None:
+        pictures.take("keyed", beside=lambda: keyed(figure, names))
     return pictures.rendered(np.concatenate([each.reshape(-1, 3) for each in points]))
 
 
@@ -125,14 +136,20 @@ class _Cells:
         self._moments: list[tuple[str, list[bpy.types.Object]]] = []
         self._points: list[Points] = []
 
-    def take(self, note: str, arrow: tuple[Points, Points] | None = None) -> None:
-        """Keep how the figure stands now."""
+    def take(
+        self,
+        note: str,
+        arrow: tuple[Points, Points] | None = None,
+        beside: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Keep how the figure stands now, and what is made beside it."""
         bpy.context.view_layer.update()
         before = set(bpy.data.objects)
         stage.leave_copy(self._figure)
         if arrow is not None:
             _arrow(*arrow)
             self._points.append(np.stack(arrow))
+        beside()
         made = [each for each in bpy.data.objects if each not in before]
         for each in made:
             each.hide_render = True
@@ -203,15 +220,22 @@ def make_doll(more: Sequence[Limb] = ()) -> bpy.types.Object:
     bpy.ops.object.mode_set(mode="OBJECT")
     for side in "LR":
         _hinge(figure, f"shin.{side}", 150.0)
-    for bone in figure.data.bones:
-        for part, colour in _parts(bone.length, thick[bone.name]):
-            made = _turned(bone.name, part, colour)
-            made.parent, made.parent_type, made.parent_bone = figure, "BONE", bone.name
+    dress(figure, thick)
+    return figure
+
+
+def dress(figure: bpy.types.Object, thick: Mapping[str, float]) -> None:
+    """Let bones carry stiff parts of wood, so thick by name."""
+    assert isinstance(figure.data, bpy.types.Armature)
+    for name, radius in thick.items():
+        bone = figure.data.bones[name]
+        for part, colour in _parts(bone.length, radius):
+            made = _turned(name, part, colour)
+            made.parent, made.parent_type, made.parent_bone = figure, "BONE", name
             # Parts hang on a bone's tail, and bones point along their Y.
             made.matrix_parent_inverse = Matrix.Translation((0.0, -bone.length, 0.0))
             made.matrix_basis = Matrix.Rotation(-0.5 * np.pi, 4, "X")
     bpy.context.view_layer.update()
-    return figure
 
 
 def _hinge(figure: bpy.types.Object, name: str, opens: float) -> None:

@@ -49,8 +49,6 @@ _FAR: Final = 0.02
 """Of the figure's size: a limb that is farther off is aimed anew."""
 _BENT: Final = 2e-3
 """Of the figure's size: a limb whose middle is nearer to its line is straight."""
-_CARRIED: Final = 1e-3
-"""How much a limb counts at first that is carried by others and not turned itself."""
 _AGAIN: Final = 15
 """Of how many poses that are written one looks for controls that are to move as well."""
 
@@ -108,9 +106,7 @@ class ControlledPuppet(Puppet):
         self._goal = pose
         self._writes += 1
         if self._fit is None or self._writes % _AGAIN == 0:
-            turned = self._turned()
-            self._weights = self._weigh(turned)
-            self._take(self._narrow(turned), placed=False)
+            self._take(self._narrow(self._turned()), placed=False)
         if self._fit is not None:
             self._fit.step(self._points.of(pose))
         return [each.name for each in self._moving]
@@ -132,7 +128,6 @@ class ControlledPuppet(Puppet):
         for close in (_CLOSE, _TOLD):
             if off.max() <= close:
                 break
-            self._weights = self._weigh(None)
             self._take(self._wide(wanted), placed=True, anew=True)
             wanted |= set(np.flatnonzero(off > _TOLD).tolist())
             if self._fit is not None:
@@ -194,7 +189,6 @@ class ControlledPuppet(Puppet):
         self._moving: list[Channels] = []
         self._placed = False
         self._writes = 0
-        self._weights = np.ones(0)
         self._start = self._points.shown(armature).reshape(-1, 3)
         self._points.match(armature, pose, self._find_reaches(armature))
 
@@ -286,14 +280,6 @@ class ControlledPuppet(Puppet):
         apart = np.linalg.norm(self._points.limbs_of(now - goal), axis=2)
         return apart.max(axis=0)
 
-    def _weigh(self, wanted: set[int] | None) -> Floats:
-        """(numbers,) how much each point counts: at first little, where others carry it along."""
-        weights = np.ones((3, len(self.figure), 3))
-        if wanted is not None:
-            carried = np.flatnonzero(self._way() > _MOVED).tolist()
-            weights[:, [each for each in carried if each not in wanted]] = _CARRIED
-        return np.concatenate([weights.ravel(), np.ones(3 * len(self._points.targets))])
-
     def _way(self) -> Floats:
         """(bodies,) how far each limb is to go, in sizes of the figure."""
         before, after = self._points.of(self._base), self._points.of(self._goal)
@@ -322,8 +308,6 @@ class ControlledPuppet(Puppet):
         """Let these controls be the ones that are moved; if they are already, they stay so."""
         known = [each.name for each in self._moving]
         if known == names and not anew and (self._placed or not placed):
-            if self._fit is not None:
-                self._fit.weights = self._weights
             return
         self._placed = placed
         armature = self.armature()
@@ -351,7 +335,7 @@ class ControlledPuppet(Puppet):
             led[rows] = [[each.name in self._needs[target]] * 3 for target in targets] or False
             start += each.count
         moves = np.concatenate([limbs.reshape(count, -1), led.reshape(count, -1)], axis=1)
-        self._fit = ControlFit(self._shape, counts, self._weights, moves)
+        self._fit = ControlFit(self._shape, counts, moves)
 
     def _shape(self, values: Floats) -> Floats:
         armature = self.armature()

@@ -53,8 +53,6 @@ class ControlFit:
     """From values (values,) to numbers (numbers,) that are to be like the goal's."""
     counts: Sequence[int]
     """How many values each control has."""
-    weights: Floats
-    """(numbers,) how much each counts."""
     moves: NDArray[np.bool_]
     """(values, numbers) which numbers a value can change."""
     now: Floats = field(init=False)
@@ -113,19 +111,17 @@ class ControlFit:
         return self.off(goal, hard)
 
     def off(self, goal: Floats, hard: int) -> float:
-        """How far the farthest of the first points is off that count whole."""
-        counts = self.weights[:hard] >= 1.0
-        apart = np.where(counts, (self.now - goal)[:hard], 0.0).reshape(-1, 3)
+        """How far the farthest of the first points is off."""
+        apart = (self.now - goal)[:hard].reshape(-1, 3)
         return float(np.linalg.norm(apart, axis=1).max(initial=0.0))
 
     def _missed(self, goal: Floats) -> float:
-        return float(np.linalg.norm(self.weights * (self.now - goal)))
+        return float(np.linalg.norm(self.now - goal))
 
     def _step(self, goal: Floats) -> bool:
         assert self._slopes is not None
         chosen = self._chosen
-        miss = self.weights * (self.now - goal)
-        slopes = self.weights[:, None] * self._slopes[:, chosen]
+        miss, slopes = self.now - goal, self._slopes[:, chosen]
         square = slopes.T @ slopes
         damped = square + self._damping * np.diag(np.diag(square) + 1e-3 * square.trace())
         damped += _STAYS**2 * np.eye(len(square))
@@ -150,14 +146,12 @@ class ControlFit:
         return nearer
 
     def _cost(self, found: Floats, values: Floats, goal: Floats) -> float:
-        miss = self.weights * (found - goal)
-        return float(miss @ miss + _STAYS**2 * (values @ values))
+        return _square(found - goal) + _STAYS**2 * _square(values)
 
     def _choose(self, goal: Floats) -> None:
         """Take controls beside those that are moved, as long as one takes away enough."""
         assert self._slopes is not None
-        slopes = self.weights[:, None] * self._slopes
-        miss = self.weights * (self.now - goal)
+        slopes, miss = self._slopes, self.now - goal
         left = _left(slopes[:, self._chosen], miss)
         waiting = [each for each in self._blocks if not set(each) & set(self._chosen)]
         start = _square(left)
