@@ -13,7 +13,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
-from math import cos, pi, sin
+from math import cos, dist, pi, sin
 from pathlib import Path
 from typing import Any, Final
 
@@ -334,6 +334,98 @@ def pose(hand: Hand, figures: Figures) -> Steps:
     yield 0.5
 
 
+def undisturbed(hand: Hand, figures: Figures) -> Steps:
+    """While a session runs, no key of Blender's reaches the scene, nor a click beside a limb; what
+    was bent stays, only that is keyed, a step back and forward go as expected, and Tab ends it.
+    """
+    new_file(hand)
+    yield 1.0
+    yield from hand.show_tab()
+    bpy.ops.octo_motion.add_octopus("INVOKE_DEFAULT")
+    creature = octopus()
+    select(creature)
+    yield from hand.settled()
+    yield from _begin_session(hand)
+    chosen = [each.name for each in bpy.context.selected_objects]
+    scale, count = tuple(creature.scale), len(bpy.data.objects)
+    region = hand.region()
+    yield from hand.move(region.x + 0.3 * region.width, region.y + 0.9 * region.height)
+    for key in ("X", "S", "H", "DEL", "A"):
+        yield from hand.key(key)
+    yield from hand.click()
+    check(_modal("OCTO_MOTION_OT_pose"), "A key or a click has ended the session.")
+    check(len(bpy.data.objects) == count, "Something was deleted.")
+    check(tuple(creature.scale) == scale and not creature.hide_get(), "Scaled or hidden.")
+    now = [each.name for each in bpy.context.selected_objects]
+    check(now == chosen, f"Chosen now: {now}")
+    yield from hand.take("undisturbed_1_keys")
+
+    before = joints(creature)
+    yield from _pull(hand, creature, "arm2.08.L", still=1.5)
+    let_go = creature.matrix_world @ creature.pose.bones["arm2.08.L"].head
+    yield 1.5
+    after = joints(creature)
+    tip = creature.pose.bones.find("arm2.08.L")
+    way = _apart(after[tip], before[tip])
+    figures["comes back %"] = round(100.0 * _apart(after[tip], let_go) / way, 2)
+    check(figures["comes back %"] < 1.0, "Clay springs back.")
+    yield from hand.key("Z", ctrl=True)
+    yield 0.5
+    check(_farthest(joints(creature), before) < 1e-4, "Ctrl Z does not take the drag back.")
+    yield from hand.key("Z", ctrl=True, shift=True)
+    yield 0.5
+    check(_farthest(joints(creature), after) < 1e-4, "Ctrl Shift Z does not bring it again.")
+    yield from hand.key("K")
+    yield 0.5
+    keyed = {curve.data_path.split('"')[1] for curve in curves(action_of(creature))}
+    figures["keyed"] = len(keyed)
+    check(keyed and all(each.startswith("arm2.") for each in keyed), f"Keyed: {sorted(keyed)}")
+    yield from hand.take("undisturbed_2_keyed")
+    yield from hand.key("TAB")
+    yield 1.0
+    check(not _modal("OCTO_MOTION_OT_pose"), "Tab has not ended the session.")
+    check(creature.mode != "EDIT", "Tab has gone on to edit mode.")
+    check(_farthest(joints(creature), after) < 1e-4, "The pose was not kept.")
+    yield from hand.take("undisturbed_3_tab")
+
+
+def over_a_motion(hand: Hand, figures: Figures) -> Steps:
+    """A key over a generated walk goes to a layer: the walk stays as it was, and nothing pops."""
+    new_file(hand)
+    yield 1.0
+    yield from hand.show_tab()
+    bpy.ops.octo_motion.add_octopus("INVOKE_DEFAULT")
+    creature = octopus()
+    select(creature)
+    bpy.ops.octo_motion.generate_locomotion()
+    walk = action_of(creature)
+    values = [_values(curve) for curve in curves(walk)]
+    scene: Any = bpy.context.scene
+    scene.frame_set(40)
+    yield from hand.settled()
+    yield from _begin_session(hand)
+    yield from _pull(hand, creature, "arm2.08.L", still=0.3)
+    yield from hand.key("K")
+    yield 0.7
+    yield from hand.take("over_a_motion_1_keyed")
+    yield from hand.key("RET")
+    yield 1.0
+    check([_values(curve) for curve in curves(walk)] == values, "The walk's own keys have changed.")
+    data = creature.animation_data
+    layers = [strip.action.name for track in data.nla_tracks for strip in track.strips]
+    figures["layers"] = len(layers) + (data.action is not None and data.action != walk)
+    check(figures["layers"], "There is no layer.")
+    places = []
+    for frame in range(30, 51):
+        scene.frame_set(frame)
+        places.append(creature.matrix_world @ creature.pose.bones["arm2.08.L"].head)
+    steps = [_apart(one, other) for one, other in zip(places[1:], places[:-1], strict=True)]
+    figures["largest step, m"] = round(max(steps), 4)
+    check(max(steps) < 0.25 * _apart(places[0], places[10]) + 0.05, "It pops.")
+    scene.frame_set(40)
+    yield from hand.take("over_a_motion_2_layer")
+
+
 def language(hand: Hand, figures: Figures) -> Steps:
     """Blender speaks Japanese, and then again what it spoke; the panel follows at once."""
     new_file(hand)
@@ -388,6 +480,8 @@ STEPS: Final[dict[str, Callable[[Hand, Figures], Steps]]] = {
     "splice": splice,
     "drop": drop,
     "pose": pose,
+    "undisturbed": undisturbed,
+    "over_a_motion": over_a_motion,
     "language": language,
     "switched_off": switched_off,
 }
@@ -426,6 +520,37 @@ def _modal(name: str) -> bool:
         for window in bpy.context.window_manager.windows
         for each in window.modal_operators
     )
+
+
+def _begin_session(hand: Hand) -> Steps:
+    yield from hand.search("Pose by Hand")
+    yield 2.0
+    check(_modal("OCTO_MOTION_OT_pose"), "The session has not begun.")
+
+
+def _pull(hand: Hand, creature: Any, bone: str, still: float) -> Steps:
+    """Drag a bone up and aside, and hold it still for some seconds before letting go."""
+    start = hand.pixel(creature.matrix_world @ creature.pose.bones[bone].head)
+    yield from hand.move(*start)
+    hand.event("LEFTMOUSE", "PRESS")
+    yield PAUSE
+    for number in range(25):
+        yield from hand.move(start[0] + 2 * number, start[1] + 6 * number)
+    yield still
+    hand.event("LEFTMOUSE", "RELEASE")
+    yield 0.3
+
+
+def _apart(one: Any, other: Any) -> float:
+    return dist(tuple(one), tuple(other))
+
+
+def _farthest(some: list[tuple[float, ...]], others: list[tuple[float, ...]]) -> float:
+    return max(dist(one, other) for one, other in zip(some, others, strict=True))
+
+
+def _values(curve: Any) -> list[tuple[float, float]]:
+    return [tuple(key.co) for key in curve.keyframe_points]
 
 
 def curves(action: Any) -> list[Any]:
