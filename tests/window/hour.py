@@ -397,6 +397,8 @@ def over_a_motion(hand: Hand, figures: Figures) -> Steps:
     bpy.ops.octo_motion.add_octopus("INVOKE_DEFAULT")
     creature = octopus()
     select(creature)
+    bpy.ops.octo_motion.add_route()
+    select(creature)
     bpy.ops.octo_motion.generate_locomotion()
     walk = action_of(creature)
     values = [_values(curve) for curve in curves(walk)]
