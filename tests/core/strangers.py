@@ -78,7 +78,7 @@ _CARRIERS = {
     "toe": ("foot", "toe"),
 }
 
-Action = Literal["walk", "throw", "dance", "balance"]
+Action = Literal["walk", "throw", "dance", "balance", "stork"]
 
 
 def about(axis: str, degrees: Floats | float) -> Floats:
@@ -138,6 +138,10 @@ def local_turns(action: Action, frames: int) -> dict[str, Floats]:
             made["thigh.R"] = about("x", -15.0) @ made["thigh.R"]
             made["shin.R"] = about("x", 40.0) @ made["shin.R"]
             made["foot.R"] = about("x", 25.0) @ made["foot.R"]
+        if action == "stork":
+            # One leg is up all the time, the other one straight.
+            hip, knee = (-80.0, 40.0) if side == "R" else (-4.0 + 2.0 * slow, 3.0)
+            made[f"thigh.{side}"], made[f"shin.{side}"] = about("x", hip), about("x", knee)
     return made
 
 

@@ -48,8 +48,15 @@ _STANDING: Final = (0.75, 0.92)
 """Of the length of legs and trunk: how far the neck is from the feet when nobody stands, and from
 where on somebody does."""
 
+_IN_LINE: Final = (float(np.cos(np.radians(60.0))), float(np.cos(np.radians(20.0))))
+"""Cosines of the angle between a leg and the trunk: of a leg that is raised, and of one to stand
+on."""
+
 _SITTING: Final = 0.05
 """Weight of a moment at which nobody stands."""
+
+_RAISED: Final = 0.02
+"""Weight of a leg that is raised all the time."""
 
 _BENT: Final = (np.radians(10.0), np.radians(35.0))
 """Bends of elbow and knee below which their plane says nothing, and from which it says all."""
@@ -303,17 +310,21 @@ class _Finder:
         """(moments,) weights: how much each says of where up is."""
         joints = self._joints
         tops, middles = self._top(), 0.5 * (joints("thigh.L") + joints("thigh.R"))
-        full, feet = _lengths(tops - middles).max(), np.zeros_like(tops)
+        trunks = tops - middles
+        full, told, feet = _lengths(trunks).max(), 0.0, np.zeros_like(tops)
         for side in "LR":
             leg = [f"{each}.{side}" for each in ("thigh", "shin", "foot")]
             leg = [each for each in leg if each in self._bones]
             for upper, lower in pairwise(leg):
                 full += 0.5 * _lengths(joints(lower) - joints(upper)).mean()
-            feet += 0.5 * joints(leg[-1])
-        self._upward = tops - feet
+            foot = joints(leg[-1])
+            # By all moments at once: a walk has each leg before it and behind in turn.
+            in_line = dot(normalized(trunks), normalized(joints(leg[0]) - foot))
+            says = max(float(_between(in_line, _IN_LINE).mean()), _RAISED) ** 2
+            feet, told = feet + says * foot, told + says
+        self._upward = tops - feet / told
         reach = _lengths(self._upward) / max(full, 1e-12)
-        least, most = _STANDING
-        return np.maximum(smooth_step((reach - least) / (most - least)), _SITTING)
+        return np.maximum(_between(reach, _STANDING), _SITTING)
 
     def _joints(self, landmark: str) -> Floats:
         return self._heads[:, self._bones[landmark]]
@@ -366,7 +377,7 @@ class _Finder:
         if not still or normalized(middle) @ shoulders < _SQUARE:
             return shoulders
         told = np.array(apart / max(width, 1e-12))
-        share = smooth_step((told - _ROOTS[0]) / (_ROOTS[1] - _ROOTS[0]))
+        share = _between(told, _ROOTS)
         return normalized((1.0 - share) * shoulders + share * normalized(middle))
 
     def _limb(
@@ -378,8 +389,7 @@ class _Finder:
         lower = self._heads[:, end] - self._heads[:, middle]
         normal = cross(normalized(upper), normalized(lower))
         bend = np.arctan2(_lengths(normal), dot(normalized(upper), normalized(lower)))
-        least, most = _BENT
-        says = smooth_step((bend - least) / (most - least))
+        says = _between(bend, _BENT)
         says *= smooth_step((np.pi - bend) / np.radians(30.0))
         # Straight, it is turned as if it had swung there from hanging, on the shortest way.
         carrier = multiply(self._turns[:, frame[0]], frame[1])
@@ -497,6 +507,11 @@ class _Finder:
                     if _lengths(places - place).max() < _RIGID * size:
                         found[carrier][name] = places.mean(axis=0)
         return found
+
+
+def _between(values: Floats, ends: tuple[float, float]) -> Floats:
+    """From 0 at the first of two values to 1 at the second."""
+    return smooth_step((values - ends[0]) / (ends[1] - ends[0]))
 
 
 def _lengths(vectors: Floats) -> Floats:
