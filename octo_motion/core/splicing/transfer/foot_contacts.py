@@ -250,26 +250,29 @@ def find_stance(paths: FootPaths) -> Stance:
     # On a treadmill nothing stands, but what turns round in the air is slow.
     low = 1.0 / (1.0 + ((heights - floors) / (_LOW * paths.leg)) ** 4)
     weights = low / (1.0 + (_speeds(paths) / _SLOW) ** 4)
-    flat = weights.prod(axis=-1)
+    flat = weights.min(axis=-1)
+    together = _says_enough(flat)
     found = []
     for point in (ANKLE, BALL):
-        choices = (flat, weights[..., point])
-        chosen = next((each for each in choices if each.max(axis=1).mean() > _LEAST), None)
-        if chosen is None:
-            found.append(float(floors[point]))
+        # Of a foot that stands flat both on one ground, which may be one of several.
+        chosen = flat if together else weights[..., point]
+        seen = heights.mean(axis=-1) if together else heights[..., point]
+        if _says_enough(chosen):
+            near = _usual(seen.ravel(), chosen.ravel(), _SPREAD * paths.leg)
+            found.append(float(near @ heights[..., point].ravel() / near.sum()))
         else:
-            usual = _usual(heights[..., point].ravel(), chosen.ravel(), _SPREAD * paths.leg)
-            found.append(usual)
+            found.append(float(floors[point]))
     return Stance(*found)
 
 
-def _usual(heights: Floats, weights: Floats, near: float) -> float:
-    """The mean of what is near the weighted height below which a third are: the ground, not a
-    step.
-    """
+def _says_enough(weights: Floats) -> bool:
+    return bool(weights.max(axis=1).mean() > _LEAST)
+
+
+def _usual(heights: Floats, weights: Floats, near: float) -> Floats:
+    """Weights of what is near the weighted height below which a third are: the ground, not a step."""
     order = np.argsort(heights)
     passed = np.cumsum(weights[order])
     middles = passed - 0.5 * weights[order]
     height = float(np.interp(_LOWER * passed[-1], middles, heights[order]))
-    weights = weights * np.exp(-(((heights - height) / near) ** 2))
-    return float(weights @ heights / weights.sum())
+    return weights * np.exp(-(((heights - height) / near) ** 2))
