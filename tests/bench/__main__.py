@@ -33,6 +33,7 @@ from tests.bench.comparison import Options
 _APART: Final = {
     "splicing": "splicing",
     "copies": "copies",
+    "pairs": "splice_pairs",
     "posing": "posing",
     "apart": "apart",
     "keys": "few_keys",

@@ -251,22 +251,19 @@ def find_stance(paths: FootPaths) -> Stance:
     low = 1.0 / (1.0 + ((heights - floors) / (_LOW * paths.leg)) ** 4)
     weights = low / (1.0 + (_speeds(paths) / _SLOW) ** 4)
     flat = weights.min(axis=-1)
-    together = _says_enough(flat)
+    said, each_said = flat.max(axis=1).mean(), weights.max(axis=1).mean(axis=0)
+    # A foot stands with both on one ground, which may be one of several.
+    together = said > _LEAST or 2.0 * said > each_said.max() > _LEAST
     found = []
     for point in (ANKLE, BALL):
-        # Of a foot that stands flat both on one ground, which may be one of several.
-        chosen = flat if together else weights[..., point]
-        seen = heights.mean(axis=-1) if together else heights[..., point]
-        if _says_enough(chosen):
+        if together or each_said[point] > _LEAST:
+            seen = heights.mean(axis=-1) if together else heights[..., point]
+            chosen = flat if together else weights[..., point]
             near = _usual(seen.ravel(), chosen.ravel(), _SPREAD * paths.leg)
             found.append(float(near @ heights[..., point].ravel() / near.sum()))
         else:
             found.append(float(floors[point]))
     return Stance(*found)
-
-
-def _says_enough(weights: Floats) -> bool:
-    return bool(weights.max(axis=1).mean() > _LEAST)
 
 
 def _usual(heights: Floats, weights: Floats, near: float) -> Floats:

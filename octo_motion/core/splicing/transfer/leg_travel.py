@@ -137,7 +137,7 @@ class LegTravel:
         standing[: len(span.weights)] *= other.standing(there, _up(other_clip))
         carried = multiply(path.orientations, conjugate(own.orientations[chosen]))
         # Over on its head a pelvis has no heading.
-        standing = standing * smooth_step(0.5 + rotate(carried, _UP)[:, 2])
+        standing = standing * smooth_step(1.0 + 2.0 * rotate(carried, _UP)[:, 2])
         turned = heading(carried, IDENTITY)
         turns, _, _ = sample_world(clip, clip.frames[chosen])
         # The waist as the base's, seen in the world but for the heading, …

@@ -36,6 +36,7 @@ _DIGITS: Final = 6
 _ANKLE: Final = 0.4
 """Leg lengths: an ankle higher above where its object stands does not stand there."""
 
+
 class TravelLock:
     """What does not hang on the timing.
 
