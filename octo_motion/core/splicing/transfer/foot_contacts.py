@@ -267,7 +267,7 @@ def find_stance(paths: FootPaths) -> Stance:
 
 
 def _usual(heights: Floats, weights: Floats, near: float) -> Floats:
-    """Weights of what is near the weighted height below which a third are: the ground, not a step."""
+    """Weights of what is near the weighted height below which a third are: ground, not a step."""
     order = np.argsort(heights)
     passed = np.cumsum(weights[order])
     middles = passed - 0.5 * weights[order]

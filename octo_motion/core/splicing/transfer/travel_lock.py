@@ -36,6 +36,9 @@ _DIGITS: Final = 6
 _ANKLE: Final = 0.4
 """Leg lengths: an ankle higher above where its object stands does not stand there."""
 
+_ALIKE: Final = 1e-3
+"""By how much legs may differ in length and travel as far."""
+
 
 class TravelLock:
     """What does not hang on the timing.
@@ -54,8 +57,9 @@ class TravelLock:
     ) -> None:
         base, splice = retargets[0].base, retargets[0].splice
         ratio = size_ratio(retargets[0])
-        self.needed = has_feet_to_hold(retargets, ground)
-        """Whether there is anything to do."""
+        alike = all(each.match.same_body for each in retargets) and abs(ratio - 1.0) < _ALIKE
+        self.needed = not alike or ground is not None
+        """Whether there is anything to do: feet of a body like the clip's stand as there."""
         if not self.needed:
             return
         self._base = base
@@ -129,13 +133,6 @@ def _followed(goal: Clip, finer: Clip, done: np.ndarray, rest: np.ndarray) -> Cl
     turned = multiply(conjugate(finer.rotations[done]), goal.rotations[done])
     rotations[rest] = multiply(finer.rotations[rest], slerp(turned[first], turned[after], share))
     return replace(goal, rotations=rotations, locations=locations)
-
-
-def has_feet_to_hold(retargets: Sequence[Retarget], ground: GroundHeight | None) -> bool:
-    """Whether feet may stand otherwise than they do in their clip: not those of a body built like
-    the clip's, of any size, which creep no more than there, unless they get another ground.
-    """
-    return ground is not None or not all(each.same_build for each in retargets)
 
 
 def size_ratio(retarget: Retarget) -> float:

@@ -52,7 +52,7 @@ from .retarget import (
     write_retargeted,
 )
 from .splice import LimbGoal
-from .travel_lock import above_soles, answering_balls, has_feet_to_hold, size_ratio
+from .travel_lock import above_soles, answering_balls, size_ratio
 
 _PARTS: Final = ("legs", "trunk", "left_arm", "right_arm", "head")
 """In the order in which they are put on: each hangs on those before it."""
@@ -213,11 +213,9 @@ class _Mover:
                 # Both legs are on: what follows hangs on the pelvis.
                 self._travel(before, rotations, locations)
         result = replace(before, rotations=rotations, locations=locations)
-        settings = self._settings
-        if not (settings.travel and settings.foot_lock):
+        if not (self._settings.travel and self._settings.foot_lock):
             return result
-        holds = has_feet_to_hold(self._retargets[:2], settings.ground)
-        return self._standing(result) if holds else result
+        return self._standing(result)
 
     def _travel(self, before: Clip, rotations: Floats, locations: Floats) -> None:
         """The pelvis's way, at the body's own size, from where its object stands."""
