@@ -31,7 +31,7 @@ import numpy as np
 from octo_motion.blender.animation.clips import read_clip
 from octo_motion.blender.scene.imports import import_clip
 from octo_motion.core.errors import ClipError, OctoMotionError
-from octo_motion.core.rotations import Floats, multiply, to_matrix
+from octo_motion.core.rotations import multiply, to_matrix
 from octo_motion.core.splicing.clip.clip import Clip, posture_of, sample_world
 from octo_motion.core.splicing.clip.rest_pose import average_pose
 from octo_motion.core.splicing.clip.splice_timing import Timing
@@ -45,7 +45,7 @@ from tests.bench.splice_joints import joints_at
 from tests.bench.splicing import quiet_blender
 from tests.referee import clip_measures as measures
 from tests.referee.clip_measures import SIDES, Joints, Twist
-from tests.referee.recording import Flags
+from tests.referee.recording import Flags, Floats
 from tests.referee.rest_poses import Bvh
 
 MOMENTS: Final = 48
@@ -185,7 +185,7 @@ class Take:
         """(moments, 3) to the left, by what moves least on the chest: shoulders or collar bones."""
         return min(self._lines(), key=self._sway)
 
-    def _lines(self) -> list[Floats]:
+    def _lines(self) -> Sequence[Floats]:
         joints = self.joints
         lines = [joints["left_shoulder"] - joints["right_shoulder"]]
         if self._collars:
@@ -233,8 +233,10 @@ class Take:
 
     def bends(self, clip: Clip, joints: Joints, limb: str, side: str) -> Twist:
         """How a limb's upper bone is turned against the plane in which it bends."""
-        chain = (joints[f"{side}_{each}"] for each in _LIMBS[limb])
-        return measures.twist(*chain, self.axes(clip, f"{_ROOTS[limb]}.{side[0].upper()}"))
+        upper, middle, lower = (joints[f"{side}_{each}"] for each in _LIMBS[limb])
+        return measures.twist(
+            upper, middle, lower, self.axes(clip, f"{_ROOTS[limb]}.{side[0].upper()}")
+        )
 
 
 def _places(clip: Clip, bone: str) -> Floats:
@@ -505,7 +507,7 @@ def takes(data: Path, folder: Path) -> list[Take]:
 def _clips(path: Path, folder: Path) -> Iterator[tuple[str, Clip]]:
     try:
         with quiet_blender():
-            armature = bpy.data.objects[
+            armature: Any = bpy.data.objects[
                 import_clip(_thinned(path, folder), bpy.context).armatures[0]
             ]
         actions = {path.stem: armature.animation_data.action}
@@ -598,8 +600,11 @@ def main(words: Sequence[str]) -> None:
     parser.add_argument("--stacks", nargs="+", default=list(STACKS), choices=list(STACKS))
     parser.add_argument("--beyond", type=int, default=10, help="name so many of each law")
     arguments = parser.parse_args(words)
+    data = os.environ.get("OCTO_MOTION_DATA")
+    if not data:
+        parser.error("OCTO_MOTION_DATA is to name the folder with the clips.")
     with quiet_blender() as told, tempfile.TemporaryDirectory() as folder:
-        people = takes(Path(os.environ["OCTO_MOTION_DATA"]), Path(folder))
+        people = takes(Path(data), Path(folder))
         with reference_poses_found_once():
             found = [
                 off
