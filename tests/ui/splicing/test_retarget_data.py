@@ -82,6 +82,20 @@ def stands(place: Floats, leg: float, fps: float) -> list[Integers]:
 ONTO = [each for each in FEET if not each.startswith("misc")]
 
 
+def test_nobody_sinks_into_the_ground_whose_clip_drifts_upwards(shared_data: SharedData) -> None:
+    """The dancer stands 15 cm higher in the middle of the clip than at its beginning and end."""
+    name, onto = "animated_drawings/rokoko_jesse_dance.bvh", "rigs_with_actions/KayKit_Knight.glb"
+    at_thirty()
+    source, hero = brought(shared_data(name)), brought(shared_data(onto))
+    rest = hero.matrix_world @ hero.data.bones[FEET[onto][-1]].head_local
+    select(source, hero)
+    OPERATORS.retarget()
+    _, ball, leg = left_foot(hero, onto, 1, 302)
+    # A pointed toe of a leg that swings low is no sunken foot.
+    lowest = np.quantile(ball[:, 2], 0.02)
+    assert lowest > rest.z - 0.05 * leg
+
+
 def test_feet_stand_also_while_somebody_with_short_legs_crouches(shared_data: SharedData) -> None:
     """The boxer is knocked down; on his short legs and large feet the Knight folds them wholly."""
     name, onto = "misc/assimp_Boxing_Toes.bvh", "rigs_with_actions/KayKit_Knight.glb"

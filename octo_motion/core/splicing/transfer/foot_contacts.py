@@ -42,8 +42,12 @@ a point that creeps on for long does not stand, nor does a heel that rises slowl
 _ROUNDS: Final = 3
 """Of taking out what is too far off: what is left has another middle."""
 
-_LOWER: Final = 0.35
-"""Of all that stands: how much of it lies below the usual height."""
+_LOWER: Final = 0.05
+"""Of all that stands: how much of it lies below where one begins to look for the ground. With a
+third the greater part of a clip that drifts upwards told it, and its beginning was buried."""
+
+_SHIFTS: Final = 20
+"""Steps to where most of it lies near by."""
 
 _SPREAD: Final = 0.02
 """Leg lengths by which heights on one ground differ: breath, soft soles, and what files lose."""
@@ -267,9 +271,16 @@ def find_stance(paths: FootPaths) -> Stance:
 
 
 def _usual(heights: Floats, weights: Floats, near: float) -> Floats:
-    """Weights of what is near the weighted height below which a third are: ground, not a step."""
+    """Weights of what is near the lowest height at which somebody stands: ground, not a step.
+
+    From what hardly anything is below it goes to where most is near by: mean shift after Comaniciu
+    and Meer, "Mean Shift: A Robust Approach Toward Feature Space Analysis" (2002).
+    """
     order = np.argsort(heights)
     passed = np.cumsum(weights[order])
     middles = passed - 0.5 * weights[order]
     height = float(np.interp(_LOWER * passed[-1], middles, heights[order]))
+    for _ in range(_SHIFTS):
+        around = weights * np.exp(-(((heights - height) / near) ** 2))
+        height = float(around @ heights / around.sum())
     return weights * np.exp(-(((heights - height) / near) ** 2))
