@@ -20,6 +20,7 @@ from puppets import Pull
 from stage import Colour, Pixels
 
 _GENERATE: Final = """
+import os
 import sys
 import bpy
 bpy.ops.preferences.addon_enable(module="rigify")
@@ -30,6 +31,8 @@ metarig = bpy.context.object
 bpy.ops.pose.rigify_generate()
 bpy.data.objects.remove(metarig)
 bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
+# Blender 4.5 does not end by itself with an add-on at work.
+os._exit(0)
 """
 """Run by a Python of its own: the add-on does not outlive a fresh start."""
 

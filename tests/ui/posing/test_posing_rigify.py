@@ -31,6 +31,7 @@ hundredth, and so does what the puppet has of them."""
 
 
 GENERATE = """
+import os
 import sys
 import bpy
 bpy.ops.preferences.addon_enable(module="rigify")
@@ -41,6 +42,8 @@ metarig = bpy.context.object
 bpy.ops.pose.rigify_generate()
 bpy.data.objects.remove(metarig)
 bpy.ops.wm.save_as_mainfile(filepath=sys.argv[1])
+# Blender 4.5 does not end by itself with an add-on at work.
+os._exit(0)
 """
 
 
@@ -54,7 +57,9 @@ def person(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if not any(each.__name__ == "rigify" for each in modules):
         pytest.skip("this Blender comes without Rigify")
     path = tmp_path_factory.mktemp("rigify") / "person.blend"
-    subprocess.run([sys.executable, "-c", GENERATE, str(path)], check=True, capture_output=True)
+    subprocess.run(
+        [sys.executable, "-c", GENERATE, str(path)], check=True, capture_output=True, timeout=300
+    )
     return path
 
 
