@@ -111,6 +111,7 @@ def body_line(
     lean: float,
     smoothing: float,
     under: float = 0.0,
+    around: tuple[float, float] | None = None,
 ) -> BodyLine:
     """The line of a body that walks on a ground.
 
@@ -124,11 +125,13 @@ def body_line(
         lean: 0 stays upright, 1 leans as the ground does, unless the settings have it.
         smoothing: reaches over which the ground is evened out along the way (standard deviation).
         under: metres from the body's centre to its lowest skin.
+        around: metres along the route from where to where the line is wanted, none for all of it.
     """
     spacing, width = reach / _HEIGHTS_PER_REACH, smoothing * reach
     margin = 2.0 * settings.stride + 4.0 * width + reach
-    count = int(np.ceil((route.length + 2.0 * margin) / spacing)) + 1
-    distance = -margin + spacing * np.arange(count)
+    start, end = around or (0.0, route.length)
+    count = int(np.ceil((end - start + 2.0 * margin) / spacing)) + 1
+    distance = start - margin + spacing * np.arange(count)
     positions, turns = walked_at(route, settings, bearings, distance)
     along = np.gradient(positions[:, :2], axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)

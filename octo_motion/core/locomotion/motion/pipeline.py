@@ -31,7 +31,7 @@ from ..clearance import (
 from ..gait import CYCLE
 from ..ground import Ground, sample_ground
 from ..metrics import TOLD, Figure, Measured, figures
-from ..path import bearings_of, plan_travel, travel_at
+from ..path import Travel, bearings_of, plan_travel, travel_at
 from ..reaching import Carried, Reached, Travelling
 from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
 from .carrying import Carry, carried
@@ -150,7 +150,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     Raises:
         OctoMotionError: an object is out of an arm's reach.
     """
-    moments, times = _moments(plan)
+    moments, times = moments_of(plan)
     reducing, every = plan.tolerances is not None or plan.subframe_sampled, plan.stride
     moving = _MOVING if reducing else 1.0
     at_once = _BONES_AT_ONCE // (_TURNS if brief else 1)
@@ -221,18 +221,32 @@ class _Posed:
     """Arms, and the body as it goes, where they were planned; none where that is the world."""
 
 
-def _moments(plan: MotionPlan) -> tuple[Floats, Floats]:
+def moments_of(plan: MotionPlan) -> tuple[Floats, Floats]:
     """Frames and times (moments,) at which a motion is worked out."""
     halves = with_half_frames if plan.subframe_sampled else np.asarray
     return halves(plan.schedule.frames), halves(plan.schedule.times)
 
 
-def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps[_Posed]:
-    """Body and arms at times (moments,) that follow one another, so many moments at a step.
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A body at some moments, before its arms are worked out."""
 
-    Cyclic, the last moment is the first again.
-    """
-    job, segments, every, standing = plan.job, plan.segments, plan.stride, plan.first.standing
+    travel: Travel
+    places: Travelled
+    """Centres (moments, 3) and orientations (moments, 4) of the canonical body, world …"""
+    eased: Travelled
+    """… and as it is brought into poses that are given."""
+    hands: list[Handover]
+    """These poses."""
+    going: Travelled
+    """The armature as it goes …"""
+    keyed: Travelled
+    """… and as it gets keys."""
+
+
+def body_at(plan: MotionPlan, times: Floats) -> Body:
+    """The body at times (moments,)."""
+    job, segments, standing = plan.job, plan.segments, plan.first.standing
     travel = plan_travel(
         plan.schedule.route,
         plan.schedule.travel,
@@ -255,8 +269,25 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     keyed = _stays(plan, going, offset) if job.in_place else going
     if hands and job.in_place:
         keyed = eased_stay(hands, keyed)
-    frames_per_metre = every * plan.pace.mean / plan.schedule.travel.stride
-    made = yield from segments.compute(travel, places, step, frames_per_metre, cyclic=cyclic)
+    return Body(travel, places, eased, hands, going, keyed)
+
+
+def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps[_Posed]:
+    """Body and arms at times (moments,) that follow one another, so many moments at a step.
+
+    Cyclic, the last moment is the first again.
+    """
+    job, segments = plan.job, plan.segments
+    body = body_at(plan, times)
+    creature, hands, travel, going, keyed = (
+        job.creature,
+        body.hands,
+        body.travel,
+        body.going,
+        body.keyed,
+    )
+    frames_per_metre = plan.stride * plan.pace.mean / plan.schedule.travel.stride
+    made = yield from segments.compute(travel, body.places, step, frames_per_metre, cyclic=cyclic)
     # Each of these takes a while; who works in turns looks about in between.
     yield 0.9
     arms = _cleared(plan, made, going, cyclic=cyclic)
@@ -276,6 +307,8 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
         reached = _reach(plan, arms, keyed, going)
         eased = _body_of(creature, going)
         eased = eased_places(hands, creature.body, creature.scale, eased)
+    else:
+        eased = body.eased
     own = going
     if hands and not job.in_place:
         keyed = going = object_transforms(creature.body, creature.scale, *eased)
@@ -350,7 +383,7 @@ def glimpse(plan: MotionPlan, frame: float) -> list[Glimpsed]:
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
-    moments, times = _moments(plan)
+    moments, times = moments_of(plan)
     if plan.job.repeats:
         lasts = moments[-1] - moments[0]
         frame = moments[0] + (frame - moments[0]) % lasts
@@ -362,11 +395,24 @@ def glimpse(plan: MotionPlan, frame: float) -> list[Glimpsed]:
     posed = finished(steps)
     if posed.hands:
         _hand_over(plan, posed)
-    motion, further = _motion(plan, posed, moments[first:last], every_width=True)
+    return _values(plan, posed, moments[first:last], middle - first)
+
+
+def glimpsed(
+    plan: MotionPlan, arms: ArmMotion, body: Body, moments: Floats
+) -> list[Glimpsed]:
+    """The values of all channels at one moment (1,), of a body with its arms there."""
+    posed = _Posed(arms, body.going, body.going, body.keyed, None, None, [], [], None)
+    return _values(plan, posed, moments, 0)
+
+
+def _values(plan: MotionPlan, posed: _Posed, moments: Floats, number: int) -> list[Glimpsed]:
+    """The values of all channels at one of some moments (moments,), by its number."""
+    motion, further = _motion(plan, posed, moments, every_width=True)
     # A scale of 1 as well: what it is elsewhere in the motion is not known here.
     channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.widths, *motion.stretch]
     channels = plan.job.creature.channels.written([*channels, *further])
-    return [Glimpsed(each.data_path, each.values[middle - first]) for each in channels]
+    return [Glimpsed(each.data_path, each.values[number]) for each in channels]
 
 
 def way_of(plan: MotionPlan) -> tuple[Floats, Floats]:

@@ -36,6 +36,7 @@ from ..path import (
     WalkedLine,
     bearings_of,
     check_transitions,
+    distances_at,
     duration,
     paced_time,
     plan_travel,
@@ -58,7 +59,7 @@ from ..rig import (
 )
 from .carrying import Carry
 from .job import BodyJob, ChangesByHeight, GaitJob, MotionJob, ShownContact, Timing, Tolerances
-from .segments import Gait, Segments, Standing, Transitions, stand
+from .segments import Gait, Nearby, Segments, Standing, Transitions, stand
 
 _posers: Final[ContentCache[GaitPoser]] = ContentCache(12)
 
@@ -339,6 +340,37 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     return plan
 
 
+def plan_near(job: MotionJob, known: MotionPlan, frame: float) -> tuple[MotionPlan, Floats]:
+    """A plan for one frame of a motion, from that of one that is nearly the same; with it comes the
+    time (1,) of that frame.
+
+    Both have one gait all the way. What has little to do with where the arms are is taken over.
+
+    Raises:
+        OctoMotionError: something is wrong that the user can put right.
+    """
+    when = schedule(job)
+    number = int(np.abs(when.frames - frame).argmin())
+    times = when.times[number : number + 1]
+    plane, before = None, known.first.standing
+    poser, gait = _poser(job, job.gaits[0], when.lean), job.gaits[0]
+    middle = float(distances_at(when.route, when.travel, times)[0])
+    near = Nearby(before, middle) if before is not None else None
+    first = _gait(job, gait, poser, when.route, lean=when.lean, plane=plane, near=near)
+    standing, walk = first.standing, None
+    if standing is not None:
+        asked = job.ground.overrides if job.ground is not None and not job.in_place else ()
+        walk = standing.walk(standing.line, asked)
+    bones = [len(each) for each in job.creature.bones]
+    plan = replace(
+        known,
+        job=job,
+        segments=Segments([first], [walk], None, bones, when.route),
+        schedule=when,
+    )
+    return plan, times
+
+
 def _along(
     job: MotionJob, carry: Carry | None, source: np.ndarray | None, standing: Standing | None
 ) -> Carry | None:
@@ -461,8 +493,9 @@ def _gait(
     *,
     lean: float,
     plane: float | None,
+    near: Nearby | None = None,
 ) -> Gait:
-    """One way of moving along this route."""
+    """One way of moving along this route, all of it or near one place."""
     table, travel, standing = gait.settings.gait, _travel(job, gait, lean), None
     if table.on_ground and job.ground is not None:
         standing = stand(
@@ -474,6 +507,7 @@ def _gait(
             height=job.height,
             plane=plane,
             cyclic=job.in_place,
+            near=near,
         )
     height = job.height
     if height is None:

@@ -8,7 +8,7 @@ both, goes over between two of its stances, and comes to rest in either meanwhil
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Final
@@ -18,6 +18,7 @@ import numpy as np
 from ...content_cache import ContentCache, content_key
 from ...rotations import Floats, rotate
 from ...smoothing import least_jerk
+from ...steps import finished
 from ..clearance import afloat
 from ..gait import CYCLE, GaitPoser, GaitTable
 from ..ground import (
@@ -86,6 +87,14 @@ _GAP: Final = 1.0
 """Arm lengths without ground that are stepped over."""
 _PATH_STEP: Final = 0.1
 """Arm lengths between the points of the route that the ground is looked for under."""
+_AROUND_STRIDES: Final = 1.0
+"""Strides of the way to either side of a place that the arms there hang on …"""
+_RESTED_STRIDES: Final = 2.0
+"""… and from either end within which it matters to them whether the body stands there."""
+_ASIDE: Final = 0.5
+"""Arm lengths that a route may lie beside another one whose ground is taken over …"""
+_LOOKS_ALONG: Final = 33
+"""… and at how many places that is looked at."""
 
 _OVER_ITSELF: Final = (
     "The route passes over itself: the ground between its levels is half way up. Choose a mesh as "
@@ -158,6 +167,33 @@ class Standing:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class Nearby:
+    """A walk that is nearly the same, and where on its way the body is that is asked for."""
+
+    standing: Standing
+    middle: float
+    """Metres along the route."""
+
+    def around(self, stride: float, length: float) -> tuple[float, float]:
+        """Metres along the route from where to where there is anything that matters there."""
+        away = _AROUND_STRIDES * stride
+        return max(self.middle - away, 0.0), min(self.middle + away, length)
+
+    def rested(self, stride: float, length: float) -> bool:
+        """Whether the body may be coming from a standstill, or to one."""
+        return min(self.middle, length - self.middle) < _RESTED_STRIDES * stride
+
+    def same_ground(self, job: GroundJob, route: Route, reach: float) -> bool:
+        """Whether its ground is as good for another walk: the same that was sampled as widely."""
+        here, there = self.standing.job.mesh, job.mesh
+        if here is None or there is None or here[1] != there[1]:
+            return False
+        share = np.linspace(0.0, 1.0, _LOOKS_ALONG)
+        apart = route.position(share) - self.standing.line.route.position(share)
+        return float(np.abs(apart).max()) < _ASIDE * reach
+
+
 def stand(
     creature: Creature,
     poser: GaitPoser,
@@ -168,6 +204,7 @@ def stand(
     height: float | None,
     plane: float | None = None,
     cyclic: bool = False,
+    near: Nearby | None = None,
 ) -> Standing:
     """Find the ground under a walk, its height over it, and when its arms hold on.
 
@@ -180,19 +217,30 @@ def stand(
         height: metres from the ground to the body's centre, none for as high as the gait is.
         plane: world Z of the level ground where no mesh is set, none to follow the route.
         cyclic: whether each cycle is like the one before, on level ground: for a loop in place.
+        near: a walk that is nearly the same, for one place of this one; none for all of it.
 
     Raises:
         GroundError: the route leaves the ground.
     """
-    scale, warnings, bearings = creature.scale, job.warnings, bearings_of(route, travel)
+    scale, warnings = creature.scale, job.warnings
+    bearings = bearings_of(route, travel, coarse=near is not None)
+    reach, phases = poser.arm_length * scale, (0.0, 2.0 * np.pi * strides(route, travel))
+    around = None if near is None else near.around(travel.stride, route.length)
     if cyclic:
         ground, underfoot, warnings = LevelGround(0.0), LevelGround(0.0), ()
     elif job.mesh is None and plane is not None:
         ground = underfoot = LevelGround(plane)
+    elif near is not None and near.same_ground(job, route, reach):
+        ground, underfoot = near.standing.ground, near.standing.underfoot
     else:
-        reach = poser.arm_length * scale
-        (ground, underfoot), more = _ground(job.mesh, route, travel, bearings, reach=reach)
+        (ground, underfoot), more = _ground(
+            job.mesh, route, travel, bearings, reach=reach, around=around
+        )
         warnings = (*more, *warnings)
+    rest = job.rest
+    if near is not None and not cyclic:
+        phases = (CYCLE / travel.stride * near.middle,) * 2
+        rest = rest if near.rested(travel.stride, route.length) else (False, False)
     under = _under(poser, [each.radii for each in job.skins])
     line = body_line(
         route,
@@ -200,10 +248,11 @@ def stand(
         bearings,
         ground,
         clearance=_height(poser, job, under) * scale if height is None else height,
-        reach=poser.arm_length * scale,
+        reach=reach,
         lean=job.stance.lean,
         smoothing=job.stance.smoothing,
         under=under * scale,
+        around=around,
     )
     return Standing(
         creature=creature,
@@ -213,8 +262,8 @@ def stand(
         bearings=bearings,
         ground=ground,
         underfoot=underfoot,
-        timing=_timing(poser, job, line, route, scale=scale, cyclic=cyclic),
-        phases=(0.0, 2.0 * np.pi * strides(route, travel)),
+        timing=_timing(poser, replace(job, rest=rest), line, route, scale=scale, cyclic=cyclic),
+        phases=phases,
         cyclic=cyclic,
         warnings=warnings,
     )
@@ -289,11 +338,15 @@ def _ground(
     bearings: Bearings,
     *,
     reach: float,
+    around: tuple[float, float] | None,
 ) -> tuple[tuple[Ground, Ground], tuple[str, ...]]:
-    """The ground of a walk, as it is and as arms feel it, and what there is to warn of."""
+    """The ground of a walk, as it is and as arms feel it, and what there is to warn of; of no more
+    of its way than from somewhere to somewhere.
+    """
     beyond = 0.0 if route.cyclic else travel.stride + reach
-    count = int(np.ceil((route.length + 2.0 * beyond) / (_PATH_STEP * reach))) + 1
-    distance = np.linspace(-beyond, route.length + beyond, count)
+    start, end = around or (0.0, route.length)
+    count = int(np.ceil((end - start + 2.0 * beyond) / (_PATH_STEP * reach))) + 1
+    distance = np.linspace(start - beyond, end + beyond, count)
     path, _ = walked_at(route, travel, bearings, distance)
     if mesh is None:
         warnings = ()
@@ -477,6 +530,13 @@ class Segments:
         phase = CYCLE * distance / gait.travel.stride
         bearings = gait.standing.bearings if gait.standing else bearings_of(line.route, gait.travel)
         return travel_at(line.route, gait.travel, bearings, distance, phase)
+
+    def by_themselves(self, travel: Travel, places: tuple[Floats, Floats]) -> ArmMotion:
+        """The arms where the gait never changes, at each moment by itself: swings as they are."""
+        motion, count = SegmentedMotion(self, travel, places), len(travel.distance)
+        motion.segments.append(SegmentMotion(ArmMotion.at_rest(count, self.bones)))
+        finished(motion.posing(0, np.arange(count), slice(0, count), None, cyclic=False))
+        return motion.segments[0].arms
 
     def compute(
         self,

@@ -34,6 +34,7 @@ from .along_route import PacedTime, Stops, ValuesAlong
 from .route import Route
 
 _FEWEST: Final = 1024
+_FEWEST_COARSE: Final = 192
 _MOST: Final = 32768
 """Intervals of the table."""
 _PER_CORNER: Final = 8
@@ -119,14 +120,14 @@ class Bearings:
         return cubic + 0.5 * t * (1.0 - t) * ((1.0 - t) * slope - t * reach)
 
 
-def bearings(route: Route, corner: float, settle: float) -> Bearings:
-    """The table of a route.
+def bearings(route: Route, corner: float, settle: float, *, fewest: int = _FEWEST) -> Bearings:
+    """The table of a route, of so many places at least.
 
     Before and after a sharp corner most of it is turned through within some metres; within others,
     a body that is not upright comes most of the way to settle there.
     """
     corner = min(corner, _MOST_CORNER * route.length)
-    count = int(np.clip(np.ceil(_PER_CORNER * route.length / corner), _FEWEST, _MOST))
+    count = int(np.clip(np.ceil(_PER_CORNER * route.length / corner), fewest, _MOST))
     spacing = route.length / count
     corner = max(corner, 4.0 * spacing)
     samples = route.parameter_at(np.linspace(0.0, route.length, count + 1))
@@ -510,10 +511,17 @@ class Travel:
         return part_of(self, frames, axis=0)
 
 
-def bearings_of(route: Route, settings: TravelSettings) -> Bearings:
-    """The table of directions that the functions here ask; made once for several of them."""
+def bearings_of(route: Route, settings: TravelSettings, *, coarse: bool = False) -> Bearings:
+    """The table of directions that the functions here ask; made once for several of them.
+
+    A coarse one is soon made, and turns by less than a degree otherwise.
+    """
     corner, settle = settings.corner * settings.stride, _SETTLE * settings.stride
-    return _tables.get(content_key(route, corner, settle), lambda: bearings(route, corner, settle))
+    fewest = _FEWEST_COARSE if coarse else _FEWEST
+    return _tables.get(
+        content_key(route, corner, settle, fewest),
+        lambda: bearings(route, corner, settle, fewest=fewest),
+    )
 
 
 def plan_travel(
@@ -539,6 +547,11 @@ def plan_travel(
     distance, phase, stood = _progress(route, settings, at)
     table = bearings_of(route, settings) if table is None else table
     return replace(travel_at(route, settings, table, distance, phase), times=at, stood=stood)
+
+
+def distances_at(route: Route, settings: TravelSettings, times: Floats) -> Floats:
+    """Metres (frames,) along the route at times (frames,) of a journey."""
+    return _progress(route, settings, np.clip(times, 0.0, 1.0))[0]
 
 
 def travel_at(

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One frame of a motion that is nearly one that is known, long before it is planned.
+
+Whoever drags a route or a slider wants to see at once where that leads. What a change does to a
+frame is soon worked out: the place where the body is then, and the arms there in the gait and on
+their footholds, by themselves. What is made of that by the frames around it (swings evened out,
+arms that make way, what is between frames), takes long, and is little. So it is taken to be what it
+is in the motion that is known, less and less the farther the gait has moved on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from ...rotations import Floats, conjugate, multiply, slerp
+from ..path import distances_at
+from ..rig import ArmMotion
+from .job import MotionJob
+from .pipeline import (
+    Body,
+    Glimpsed,
+    body_at,
+    glimpsed,
+    moments_of,
+)
+from .planning import MotionPlan, plan_near
+
+_WINDOW: Final = 12
+"""Moments to either side of one of which it is found at once what the frames around them make of
+the arms; arms of an even gait are as far as the body at all of them, others within some frames."""
+
+
+@dataclass(frozen=True, eq=False)
+class KnownMotion:
+    """A motion that was worked out, or a few of its moments."""
+
+    plan: MotionPlan
+    arms: ArmMotion
+    """At some moments that follow one another …"""
+    first: int
+    """… and the number of the first of these."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """What the frames around them make of arms, at some moments around a frame."""
+
+    middle: int
+    """Number of the moment around which they are."""
+    phases: Floats
+    """(moments, arms) radians, never less than at the moment before."""
+    turns: Floats
+    """(moments, bones, 4) what bones are turned by, each in its own frame …"""
+    strains: Floats
+    """… and (moments, bones) by how much they are longer."""
+
+
+class Sketch:
+    """Frames of motions that are nearly one that is known.
+
+    Args:
+        known: the one that is known.
+    """
+
+    def __init__(self, known: KnownMotion) -> None:
+        self._known = known
+        self._made: _Made | None = None
+        when = known.plan.schedule
+        distance = distances_at(when.route, when.travel, moments_of(known.plan)[1])
+        self._strides: Floats = distance / when.travel.stride
+        """(moments,) that the body has come, at all of the motion."""
+
+    def may_show(self, job: MotionJob, frame: float) -> bool:
+        """Whether a motion can be drawn so at a frame: on one gait all the way, in the world as it
+        is planned, and it begins and ends as it likes; its arms and way of moving are the same.
+        """
+        plan, known = self._known.plan, self._known.plan.job
+        return (
+            plan.segments.transitions is None
+            and plan.carry is None
+            and _is_simple(known)
+            and _is_simple(job)
+            and job.in_place == known.in_place
+            and job.creature.bones == known.creature.bones
+            and _manner(job) == _manner(known)
+            and 0 <= self._number(frame) - self._known.first < len(self._known.arms.rotations)
+        )
+
+    def prepare(self, frame: float) -> None:
+        """Work out beforehand what will be asked for near a frame."""
+        self._made_around(self._number(frame))
+
+    def at(self, job: MotionJob, frame: float) -> list[Glimpsed]:
+        """What a motion is nearly at a frame: the values of all channels.
+
+        Raises:
+            OctoMotionError: something is wrong that the user can put right.
+        """
+        plan, times = plan_near(job, self._known.plan, frame)
+        body = body_at(plan, times)
+        arms = plan.segments.by_themselves(body.travel, body.places)
+        come = float(body.travel.distance[0]) / plan.schedule.travel.stride
+        moments = np.arange(len(self._strides), dtype=np.float64)
+        made = self._made_around(round(float(np.interp(come, self._strides, moments))))
+        arms = self._with_what_is_made(made, arms, plan, body)
+        return glimpsed(plan, arms, body, np.array([frame]))
+
+    def _made_around(self, number: int) -> _Made:
+        """What is made of arms around one of the moments."""
+        known, plan = self._known, self._known.plan
+        begin, end = known.first, known.first + len(known.arms.rotations)
+        number = min(max(number, begin), end - 1)
+        if (made := self._made) is None or abs(number - made.middle) > _WINDOW // 2:
+            first, last = max(number - _WINDOW, begin), min(number + _WINDOW + 1, end)
+            body = body_at(plan, moments_of(plan)[1][first:last])
+            bare = plan.segments.by_themselves(body.travel, body.places)
+            whole = known.arms.at(slice(first - begin, last - begin))
+            self._made = made = _Made(
+                number,
+                _phases(plan, body),
+                multiply(conjugate(bare.rotations), whole.rotations),
+                whole.strains - bare.strains,
+            )
+        return made
+
+    def _number(self, frame: float) -> int:
+        """Number of the moment that is nearest to a frame."""
+        return int(np.abs(moments_of(self._known.plan)[0] - frame).argmin())
+
+    @staticmethod
+    def _with_what_is_made(
+        made: _Made, arms: ArmMotion, plan: MotionPlan, body: Body
+    ) -> ArmMotion:
+        """Arms at one moment, with what the frames around it make of them: of each arm what they do
+        where it is as far in its cycle.
+        """
+        rotations, strains = arms.rotations.copy(), arms.strains.copy()
+        last = len(made.phases) - 1
+        for arm, (own, wanted) in enumerate(
+            zip(made.phases.T, _phases(plan, body)[0].tolist(), strict=True)
+        ):
+            bones = plan.segments.bones_of[arm]
+            place = float(np.interp(wanted, own, np.arange(last + 1.0)))
+            before = min(int(place), max(last - 1, 0))
+            after, share = min(before + 1, last), place - before
+            here, then = made.turns[before, bones], made.turns[after, bones]
+            turns = slerp(here, then, np.full(len(here), share))
+            rotations[0, bones] = multiply(rotations[0, bones], turns)
+            own = made.strains[before, bones], made.strains[after, bones]
+            strains[0, bones] += own[0] + share * (own[1] - own[0])
+        return replace(arms, rotations=rotations, strains=strains)
+
+
+def _phases(plan: MotionPlan, body: Body) -> Floats:
+    """Each arm's own phase (moments, arms), radians."""
+    walk, phase = plan.segments.walks[0], body.travel.phase
+    if walk is None:
+        return np.repeat(phase[:, None], len(plan.segments.bones), axis=1)
+    return walk.arm_phases(phase)
+
+
+def _manner(job: MotionJob) -> tuple[bool, str]:
+    table = job.gaits[0].settings.gait
+    return table.on_ground, table.manner
+
+
+def _is_simple(job: MotionJob) -> bool:
+    rolls = job.ground is not None and (
+        job.ground.moving is not None or job.ground.stance.up == "GROUND"
+    )
+    given = job.begin is not None or job.end is not None or job.reaching is not None
+    return not (rolls or given or job.changes)
