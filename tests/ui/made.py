@@ -14,8 +14,7 @@ import numpy as np
 from octo_motion.core.locomotion.gait import Arm, GaitPoser, GaitTable
 from octo_motion.core.locomotion.ground import GroundedPoses, GroundedWalk
 from octo_motion.core.locomotion.metrics import figures, report
-from octo_motion.core.locomotion.motion import MotionPlan, MotionResult
-from octo_motion.core.locomotion.motion.pipeline import pose, with_half_frames
+from octo_motion.core.locomotion.motion import MotionPlan, MotionResult, pose
 from octo_motion.core.locomotion.motion.segments import Standing, Transitions
 from octo_motion.core.locomotion.path import Route, Travel, TravelSettings, plan_travel
 from octo_motion.core.locomotion.rig import BodyFrame
@@ -155,9 +154,8 @@ class Made:
     def swimming(self) -> np.ndarray:
         """(moments,) how far the body has gone over from a walk to a swim."""
         schedule, standing = self.plan.schedule, self.plan.first.standing
-        times = with_half_frames(schedule.times) if self.every == 2 else schedule.times
         bearings = standing.bearings if standing is not None else None
-        travel = plan_travel(schedule.route, schedule.travel, times, bearings)
+        travel = plan_travel(schedule.route, schedule.travel, self.plan.moments[1], bearings)
         swimming = self.plan.segments.swimming(travel.distance)
         assert swimming is not None
         return swimming

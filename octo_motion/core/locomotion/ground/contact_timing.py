@@ -133,12 +133,9 @@ def body_line(
     count = int(np.ceil((end - start + 2.0 * margin) / spacing)) + 1
     distance = start - margin + spacing * np.arange(count)
     positions, turns = walked_at(route, settings, bearings, distance)
-    along = np.gradient(positions[:, :2], axis=0)
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
-    left = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    along, left = _ways(positions)
     felt = ground.height(positions[:, None, :2] + reach * _ACROSS[:, None] * left[:, None])
-    kernel = _bell(width / spacing)
-    share = distance / route.length
+    kernel, share = _bell(width / spacing), distance / route.length
     clearances = clearance + values_along(settings.along.height, share, 0.0)
     headroom = np.maximum(_HEADROOM * clearances, np.minimum(under, _MOST_HEADROOM * clearances))
     level = _over_bumps(
@@ -163,6 +160,15 @@ def body_line(
         ways=positions,
         turns=continuous(turns),
     )
+
+
+def _ways(positions: Floats) -> tuple[Floats, Floats]:
+    """Which way a body goes through positions (n, 3) and what is left of it, seen from above: unit
+    vectors (n, 2) both.
+    """
+    along = np.gradient(positions[:, :2], axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    return along, np.stack([-along[:, 1], along[:, 0]], axis=1)
 
 
 def _over_bumps(

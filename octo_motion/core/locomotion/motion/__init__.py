@@ -17,15 +17,27 @@ from .job import (
     Tolerances,
     Trailing,
 )
-from .pipeline import MISS, Glimpsed, MotionResult, compute, glimpse, pose, way_of
+from .pipeline import (
+    MISS,
+    Glimpse,
+    Glimpsed,
+    KnownMotion,
+    MotionResult,
+    compute,
+    glimpse,
+    pose,
+    way_of,
+)
 from .planning import (
     GaitTargets,
     MotionPlan,
     gait_targets,
     plan_motion,
+    reach_of,
     schedule,
     shown_contacts,
 )
+from .sketch import Sketch
 
 __all__ = [
     "MISS",
@@ -38,12 +50,15 @@ __all__ = [
     "GaitJob",
     "GaitTargets",
     "GivenPose",
+    "Glimpse",
     "Glimpsed",
     "GroundJob",
+    "KnownMotion",
     "MotionJob",
     "MotionPlan",
     "MotionResult",
     "ShownContact",
+    "Sketch",
     "Timing",
     "Tolerances",
     "Trailing",
@@ -52,6 +67,7 @@ __all__ = [
     "glimpse",
     "plan_motion",
     "pose",
+    "reach_of",
     "schedule",
     "shown_contacts",
     "way_of",

@@ -16,7 +16,6 @@ import numpy as np
 from ...keyframes import Channel
 from ...phrases import phrase
 from ...rotations import IDENTITY, Floats, conjugate, from_matrix, multiply, rotate, slerp
-from ...steps import finished
 from ..body import BodyMoments, OrganPoses, pose_organs
 from ..clearance import (
     ArmsOverGround,
@@ -79,6 +78,11 @@ class MotionResult:
     def frames(self) -> Floats:
         """(frames,) whole numbers."""
         return self.plan.schedule.frames
+
+    @property
+    def known(self) -> KnownMotion:
+        """What motions that are nearly the same are soon drawn from."""
+        return KnownMotion(self.plan, self.arms, 0)
 
     @property
     def miss(self) -> float:
@@ -150,7 +154,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     Raises:
         OctoMotionError: an object is out of an arm's reach.
     """
-    moments, times = moments_of(plan)
+    moments, times = plan.moments
     reducing, every = plan.tolerances is not None or plan.subframe_sampled, plan.stride
     moving = _MOVING if reducing else 1.0
     at_once = _BONES_AT_ONCE // (_TURNS if brief else 1)
@@ -219,12 +223,6 @@ class _Posed:
     """The poses that it begins and ends in."""
     planned: tuple[ArmMotion, Travelled] | None
     """Arms, and the body as it goes, where they were planned; none where that is the world."""
-
-
-def moments_of(plan: MotionPlan) -> tuple[Floats, Floats]:
-    """Frames and times (moments,) at which a motion is worked out."""
-    halves = with_half_frames if plan.subframe_sampled else np.asarray
-    return halves(plan.schedule.frames), halves(plan.schedule.times)
 
 
 @dataclass(frozen=True, eq=False)
@@ -373,34 +371,32 @@ def _carried(
     )
 
 
-def glimpse(plan: MotionPlan, frame: float) -> list[Glimpsed]:
-    """What a motion is at one of its frames, long before all of it is worked out: the values of
-    all channels there.
+def glimpse(plan: MotionPlan, frame: float) -> Steps[Glimpse]:
+    """What a motion is at one of its frames, long before all of it is worked out.
 
-    Worked out from the moments around it that it hangs on. Before the first frame and after the
-    last it is as it is there.
+    Worked out, in steps, from the moments around it that it hangs on. Before the first frame and
+    after the last it is as it is there.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
-    moments, times = moments_of(plan)
-    if plan.job.repeats:
-        lasts = moments[-1] - moments[0]
-        frame = moments[0] + (frame - moments[0]) % lasts
-    middle = int(np.abs(moments - frame).argmin())
+    moments, times = plan.moments
+    middle = plan.moment_of(frame)
     around = plan.stride * plan.pace.mean * _AROUND_CYCLES
     around = int(np.clip(np.ceil(around), *_AROUND_MOMENTS))
     first, last = max(middle - around, 0), middle + around + 1
-    steps = _posed(plan, times[first:last], 2 * around + 1, cyclic=False)
-    posed = finished(steps)
+    posed = yield from _posed(plan, times[first:last], 2 * around + 1, cyclic=False)
     if posed.hands:
         _hand_over(plan, posed)
-    return _values(plan, posed, moments[first:last], middle - first)
+    yield 1.0
+    values = _values(plan, posed, moments[first:last], middle - first)
+    # What is far from the middle hangs on more than these moments.
+    within = max(middle - around // 2, 0)
+    part = slice(within - first, middle - first + around // 2 + 1)
+    return Glimpse(values, KnownMotion(plan, posed.arms.at(part), within))
 
 
-def glimpsed(
-    plan: MotionPlan, arms: ArmMotion, body: Body, moments: Floats
-) -> list[Glimpsed]:
+def glimpsed(plan: MotionPlan, arms: ArmMotion, body: Body, moments: Floats) -> list[Glimpsed]:
     """The values of all channels at one moment (1,), of a body with its arms there."""
     posed = _Posed(arms, body.going, body.going, body.keyed, None, None, [], [], None)
     return _values(plan, posed, moments, 0)
@@ -415,9 +411,9 @@ def _values(plan: MotionPlan, posed: _Posed, moments: Floats, number: int) -> li
     return [Glimpsed(each.data_path, each.values[number]) for each in channels]
 
 
-def way_of(plan: MotionPlan) -> tuple[Floats, Floats]:
-    """Where a motion leads, long before it is worked out: places of the body's centre (n, 3) one
-    after the other, and of all footholds (m, 3), world.
+def way_of(plan: MotionPlan) -> tuple[Floats, Floats, Floats]:
+    """Where a motion leads, long before it is worked out: places of the body's centre (n, 3), as
+    far one after the other, and of all footholds (m, 3), world; at these it has come (m,) metres.
     """
     standing, segments = plan.first.standing, plan.segments
     distance = np.linspace(0.0, plan.schedule.route.length, _WAY)
@@ -432,11 +428,11 @@ def way_of(plan: MotionPlan) -> tuple[Floats, Floats]:
     walks = [walk for walk in plan.segments.walks if walk is not None]
     found = [(each.position, each.touch_down) for walk in walks for each in walk.footholds()]
     held = np.array([each for each, _ in found], dtype=np.float64).reshape(-1, 3)
+    come = plan.schedule.travel.stride / CYCLE * np.array([each for _, each in found])
     if plan.carry is not None:
-        come = plan.schedule.travel.stride / CYCLE * np.array([each for _, each in found])
         centres, _ = plan.carry.places(centres, distance)
         held, _ = plan.carry.places(held, come)
-    return centres, held
+    return centres, held, come
 
 
 @dataclass(frozen=True, eq=False)
@@ -448,11 +444,25 @@ class Glimpsed:
     """(components,)"""
 
 
-def with_half_frames(values: Floats) -> Floats:
-    """Values (frames,) with those half way in between (2 frames − 1,)."""
-    result = np.empty(2 * len(values) - 1)
-    result[::2], result[1::2] = values, 0.5 * (values[:-1] + values[1:])
-    return result
+@dataclass(frozen=True, eq=False)
+class KnownMotion:
+    """A motion that was worked out, or a few of its moments."""
+
+    plan: MotionPlan
+    arms: ArmMotion
+    """At some moments that follow one another …"""
+    first: int
+    """… and the number of the first of these."""
+
+
+@dataclass(frozen=True, eq=False)
+class Glimpse:
+    """What a motion is at one of its frames."""
+
+    values: list[Glimpsed]
+    """Of all channels."""
+    known: KnownMotion
+    """The moments around it."""
 
 
 def _scaled(steps: Steps[_Outcome], start: float, end: float) -> Steps[_Outcome]:

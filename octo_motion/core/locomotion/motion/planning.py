@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Final
 
 import numpy as np
@@ -58,7 +58,16 @@ from ..rig import (
     stretch_mantle,
 )
 from .carrying import Carry
-from .job import BodyJob, ChangesByHeight, GaitJob, MotionJob, ShownContact, Timing, Tolerances
+from .job import (
+    BodyJob,
+    ChangesByHeight,
+    Creature,
+    GaitJob,
+    MotionJob,
+    ShownContact,
+    Timing,
+    Tolerances,
+)
 from .segments import Gait, Nearby, Segments, Standing, Transitions, stand
 
 _posers: Final[ContentCache[GaitPoser]] = ContentCache(12)
@@ -247,6 +256,21 @@ class MotionPlan:
         """At every how many moments that are worked out there is a frame."""
         return 2 if self.subframe_sampled else 1
 
+    @cached_property
+    def moments(self) -> tuple[Floats, Floats]:
+        """Frames and times (moments,) at which the motion is worked out."""
+        halves = with_half_frames if self.subframe_sampled else np.asarray
+        return halves(self.schedule.frames), halves(self.schedule.times)
+
+    def moment_of(self, frame: float) -> int:
+        """Number of the moment that is nearest to a frame; of a loop, in the round that it has
+        moments of.
+        """
+        frames = self.moments[0]
+        if self.job.repeats:
+            frame = frames[0] + (frame - frames[0]) % (frames[-1] - frames[0])
+        return int(np.abs(frames - frame).argmin())
+
     @property
     def tolerances(self) -> Tolerances | None:
         """How far few keys may be off, in the armature's units; none for a key on every frame."""
@@ -254,6 +278,13 @@ class MotionPlan:
         if asked is None or self.job.live:
             return None
         return replace(asked, distance=asked.distance * length, held=asked.held * length)
+
+
+def with_half_frames(values: Floats) -> Floats:
+    """Values (frames,) with those half way in between (2 frames − 1,)."""
+    result = np.empty(2 * len(values) - 1)
+    result[::2], result[1::2] = values, 0.5 * (values[:-1] + values[1:])
+    return result
 
 
 def schedule(job: MotionJob) -> Schedule:
@@ -340,35 +371,31 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     return plan
 
 
-def plan_near(job: MotionJob, known: MotionPlan, frame: float) -> tuple[MotionPlan, Floats]:
+def plan_near(job: MotionJob, known: MotionPlan, frame: float) -> tuple[MotionPlan, int]:
     """A plan for one frame of a motion, from that of one that is nearly the same; with it comes the
-    time (1,) of that frame.
+    number of that moment.
 
     Both have one gait all the way. What has little to do with where the arms are is taken over.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
-    when = schedule(job)
-    number = int(np.abs(when.frames - frame).argmin())
-    times = when.times[number : number + 1]
-    plane, before = None, known.first.standing
-    poser, gait = _poser(job, job.gaits[0], when.lean), job.gaits[0]
-    middle = float(distances_at(when.route, when.travel, times)[0])
-    near = Nearby(before, middle) if before is not None else None
-    first = _gait(job, gait, poser, when.route, lean=when.lean, plane=plane, near=near)
-    standing, walk = first.standing, None
-    if standing is not None:
+    when, gait = schedule(job), job.gaits[0]
+    plan = replace(known, job=job, schedule=when)
+    number = plan.moment_of(frame)
+    times = plan.moments[1][number : number + 1]
+    near = None
+    if (before := known.first.standing) is not None:
+        near = Nearby(before, float(distances_at(when.route, when.travel, times)[0]))
+    poser = _poser(job, gait, when.lean)
+    first = _gait(job, gait, poser, when.route, lean=when.lean, plane=None, near=near)
+    walk = None
+    if first.standing is not None:
         asked = job.ground.overrides if job.ground is not None and not job.in_place else ()
-        walk = standing.walk(standing.line, asked)
+        walk = first.standing.walk(first.standing.line, asked)
     bones = [len(each) for each in job.creature.bones]
-    plan = replace(
-        known,
-        job=job,
-        segments=Segments([first], [walk], None, bones, when.route),
-        schedule=when,
-    )
-    return plan, times
+    segments = Segments([first], [walk], None, bones, when.route)
+    return replace(plan, segments=segments), number
 
 
 def _along(
@@ -383,7 +410,7 @@ def _along(
     faces = ground.mesh[0]
     source = np.arange(len(faces)) if source is None else source
     carpet = Carpet.of(ground.moving, standing.ground, faces, source)
-    reach = _arm_length(job) * job.creature.scale
+    reach = reach_of(job.creature)
     return Carry(carry.unrolled if carry is not None else None, reach, carpet)
 
 
@@ -395,7 +422,7 @@ def _planned(job: MotionJob) -> tuple[MotionJob, Carry | None, np.ndarray | None
     if ground is None or ground.mesh is None or route is None or ground.stance.up == "WORLD":
         return job, None, None
     triangles, content = ground.mesh
-    reach, always = _arm_length(job) * job.creature.scale, ground.stance.up == "GROUND"
+    reach, always = reach_of(job.creature), ground.stance.up == "GROUND"
     beyond = max(each.travel.stride for each in job.gaits) * reach + reach
     sizes = reach, beyond, always
 
@@ -456,14 +483,14 @@ def gait_targets(job: MotionJob) -> GaitTargets:
     return GaitTargets(when.frames, places, groups)
 
 
-def _arm_length(job: MotionJob) -> float:
+@lru_cache(maxsize=2)
+def reach_of(creature: Creature) -> float:
     """Mean length of the arms, metres: what strides are counted in."""
-    creature = job.creature
     joints = [
         creature.body.to_body(joint_positions(creature.skeleton, each)) for each in creature.bones
     ]
     lengths = [float(np.linalg.norm(np.diff(each, axis=0), axis=1).sum()) for each in joints]
-    return float(np.array(lengths).mean())
+    return float(np.array(lengths).mean()) * creature.scale
 
 
 def _poser(job: MotionJob, gait: GaitJob, lean: float) -> GaitPoser:
@@ -475,7 +502,7 @@ def _poser(job: MotionJob, gait: GaitJob, lean: float) -> GaitPoser:
 
 def _travel(job: MotionJob, gait: GaitJob, lean: float) -> TravelSettings:
     """How the body travels in a gait."""
-    reach = _arm_length(job) * job.creature.scale
+    reach = reach_of(job.creature)
     travel = replace(
         gait.travel,
         stride=gait.travel.stride * reach,
@@ -629,7 +656,7 @@ def _stalking(job: MotionJob, when: Schedule, segments: Segments) -> Stalking | 
     if paced is None or paced.stops is None or standing is None:
         return None
     room = float(standing.line.clearances.min()) - standing.under
-    sinks = min(_CROUCHED * _arm_length(job) * job.creature.scale, _ABOVE * max(room, 0.0))
+    sinks = min(_CROUCHED * reach_of(job.creature), _ABOVE * max(room, 0.0))
     return Stalking(paced.stops.amount, sinks, job.body.seed)
 
 

@@ -18,7 +18,6 @@ import numpy as np
 from ...content_cache import ContentCache, content_key
 from ...rotations import Floats, rotate
 from ...smoothing import least_jerk
-from ...steps import finished
 from ..clearance import afloat
 from ..gait import CYCLE, GaitPoser, GaitTable
 from ..ground import (
@@ -137,7 +136,7 @@ class Standing:
     @property
     def under(self) -> float:
         """Metres that a body's skin reaches below its centre where its arms begin."""
-        return _under(self.poser, self.radii) * self.creature.scale
+        return _under(self.poser, self.job) * self.creature.scale
 
     def place(self, travel: Travel) -> tuple[Floats, Floats]:
         """World positions (frames, 3) and orientations (frames, 4) of the canonical body."""
@@ -180,9 +179,14 @@ class Nearby:
         away = _AROUND_STRIDES * stride
         return max(self.middle - away, 0.0), min(self.middle + away, length)
 
-    def rested(self, stride: float, length: float) -> bool:
-        """Whether the body may be coming from a standstill, or to one."""
-        return min(self.middle, length - self.middle) < _RESTED_STRIDES * stride
+    def phases(self, stride: float) -> tuple[float, float]:
+        """The first and the last phase, radians, of the body that is asked for."""
+        return (CYCLE / stride * self.middle,) * 2
+
+    def as_rested(self, job: GroundJob, stride: float, length: float) -> GroundJob:
+        """The same without what arms do as the body stands at its ends, where it is far off."""
+        near_end = min(self.middle, length - self.middle) < _RESTED_STRIDES * stride
+        return job if near_end else replace(job, rest=(False, False))
 
     def same_ground(self, job: GroundJob, route: Route, reach: float) -> bool:
         """Whether its ground is as good for another walk: the same that was sampled as widely."""
@@ -217,43 +221,30 @@ def stand(
         height: metres from the ground to the body's centre, none for as high as the gait is.
         plane: world Z of the level ground where no mesh is set, none to follow the route.
         cyclic: whether each cycle is like the one before, on level ground: for a loop in place.
-        near: a walk that is nearly the same, for one place of this one; none for all of it.
+        near: a walk that is nearly the same; then only one place of this one is wanted.
 
     Raises:
         GroundError: the route leaves the ground.
     """
-    scale, warnings = creature.scale, job.warnings
-    bearings = bearings_of(route, travel, coarse=near is not None)
-    reach, phases = poser.arm_length * scale, (0.0, 2.0 * np.pi * strides(route, travel))
-    around = None if near is None else near.around(travel.stride, route.length)
-    if cyclic:
-        ground, underfoot, warnings = LevelGround(0.0), LevelGround(0.0), ()
-    elif job.mesh is None and plane is not None:
-        ground = underfoot = LevelGround(plane)
-    elif near is not None and near.same_ground(job, route, reach):
-        ground, underfoot = near.standing.ground, near.standing.underfoot
-    else:
-        (ground, underfoot), more = _ground(
-            job.mesh, route, travel, bearings, reach=reach, around=around
-        )
-        warnings = (*more, *warnings)
-    rest = job.rest
-    if near is not None and not cyclic:
-        phases = (CYCLE / travel.stride * near.middle,) * 2
-        rest = rest if near.rested(travel.stride, route.length) else (False, False)
-    under = _under(poser, [each.radii for each in job.skins])
+    bearings, scale = bearings_of(route, travel, coarse=near is not None), creature.scale
+    reach, phases = poser.arm_length * scale, (0.0, CYCLE * strides(route, travel))
+    (ground, underfoot), warnings = _ground(
+        job, route, travel, bearings, reach=reach, plane=plane, cyclic=cyclic, near=near
+    )
     line = body_line(
         route,
         travel,
         bearings,
         ground,
-        clearance=_height(poser, job, under) * scale if height is None else height,
+        clearance=_height(poser, job) * scale if height is None else height,
         reach=reach,
         lean=job.stance.lean,
         smoothing=job.stance.smoothing,
-        under=under * scale,
-        around=around,
+        under=_under(poser, job) * scale,
+        around=near and near.around(travel.stride, route.length),
     )
+    if near and not cyclic:
+        phases, job = near.phases(travel.stride), near.as_rested(job, travel.stride, route.length)
     return Standing(
         creature=creature,
         poser=poser,
@@ -262,7 +253,7 @@ def stand(
         bearings=bearings,
         ground=ground,
         underfoot=underfoot,
-        timing=_timing(poser, replace(job, rest=rest), line, route, scale=scale, cyclic=cyclic),
+        timing=_timing(poser, job, line, route, scale=scale, cyclic=cyclic),
         phases=phases,
         cyclic=cyclic,
         warnings=warnings,
@@ -299,18 +290,21 @@ def _timing(
     )
 
 
-def _under(poser: GaitPoser, radii: Sequence[Floats]) -> float:
+def _under(poser: GaitPoser, job: GroundJob) -> float:
     """How far a body's skin reaches below its centre where its arms begin, armature units."""
-    skins = [radius[0] - root[2] for radius, root in zip(radii, poser.roots, strict=True)]
+    arms = zip(job.skins, poser.roots, strict=True)
+    skins = [skin.radii[0] - root[2] for skin, root in arms]
     return float(max(skins))
 
 
-def _height(poser: GaitPoser, job: GroundJob, under: float) -> float:
+def _height(poser: GaitPoser, job: GroundJob) -> float:
     """As high as the gait is, and as low as arms reach with ease, armature units."""
     radii = [each.radii for each in job.skins]
     thickness = float(np.mean([each[len(each) // 2] for each in radii]))
     easy = _within_reach(poser, radii, job.may_stretch, job.stance)
-    return max(min(poser.clearance + thickness, easy), under, _LOWEST * poser.arm_length)
+    return max(
+        min(poser.clearance + thickness, easy), _under(poser, job), _LOWEST * poser.arm_length
+    )
 
 
 def _within_reach(
@@ -332,31 +326,37 @@ def _within_reach(
 
 
 def _ground(
-    mesh: tuple[Floats, bytes] | None,
+    job: GroundJob,
     route: Route,
     travel: TravelSettings,
     bearings: Bearings,
     *,
     reach: float,
-    around: tuple[float, float] | None,
+    plane: float | None,
+    cyclic: bool,
+    near: Nearby | None,
 ) -> tuple[tuple[Ground, Ground], tuple[str, ...]]:
-    """The ground of a walk, as it is and as arms feel it, and what there is to warn of; of no more
-    of its way than from somewhere to somewhere.
-    """
+    """The ground of a walk, as it is and as arms feel it, and what there is to warn of."""
+    if cyclic:
+        return (LevelGround(0.0),) * 2, ()
+    if job.mesh is None and plane is not None:
+        return (LevelGround(plane),) * 2, job.warnings
+    if near is not None and near.same_ground(job, route, reach):
+        return (near.standing.ground, near.standing.underfoot), job.warnings
     beyond = 0.0 if route.cyclic else travel.stride + reach
-    start, end = around or (0.0, route.length)
+    start, end = (0.0, route.length) if near is None else near.around(travel.stride, route.length)
     count = int(np.ceil((end - start + 2.0 * beyond) / (_PATH_STEP * reach))) + 1
     distance = np.linspace(start - beyond, end + beyond, count)
     path, _ = walked_at(route, travel, bearings, distance)
-    if mesh is None:
-        warnings = ()
+    if job.mesh is None:
+        warnings = job.warnings
         if passes_over_itself(path, 0.5 * reach, 0.5 * reach):
-            warnings = (_OVER_ITSELF,)
+            warnings = (_OVER_ITSELF, *warnings)
         around, spacing = _AROUND * reach, _COARSE * reach
         ground = ground_along_path(path, reach=around, spacing=spacing, softness=0.3 * reach)
         return (ground, ground), warnings
     inside = (distance >= 0.0) & (distance <= route.length)
-    triangles, content = mesh
+    triangles, content = job.mesh
     sizes = {"reach": _AROUND * reach, "spacing": _FINE * reach, "headroom": _HEADROOM * reach}
     sizes["gap"] = _GAP * reach
 
@@ -364,7 +364,7 @@ def _ground(
         ground = sample_ground(triangles, path, inside, **sizes, content=content)
         return ground, ground.rounded(_EDGE * reach)
 
-    return _grounds.get(content_key(content, path, inside, sizes), sampled), ()
+    return _grounds.get(content_key(content, path, inside, sizes), sampled), job.warnings
 
 
 # --- Segments: one for each gait along the way, and how arms go over from one to the next ---------
@@ -531,11 +531,16 @@ class Segments:
         bearings = gait.standing.bearings if gait.standing else bearings_of(line.route, gait.travel)
         return travel_at(line.route, gait.travel, bearings, distance, phase)
 
-    def by_themselves(self, travel: Travel, places: tuple[Floats, Floats]) -> ArmMotion:
-        """The arms where the gait never changes, at each moment by itself: swings as they are."""
+    def posing_by_themselves(
+        self, travel: Travel, places: tuple[Floats, Floats]
+    ) -> Generator[float, None, ArmMotion]:
+        """The arms where the gait never changes, at each moment by itself, in steps: swings as they
+        are.
+        """
         motion, count = SegmentedMotion(self, travel, places), len(travel.distance)
         motion.segments.append(SegmentMotion(ArmMotion.at_rest(count, self.bones)))
-        finished(motion.posing(0, np.arange(count), slice(0, count), None, cyclic=False))
+        for _ in motion.posing(0, np.arange(count), slice(0, count), None, cyclic=False):
+            yield 0.5
         return motion.segments[0].arms
 
     def compute(

@@ -10,38 +10,30 @@ is in the motion that is known, less and less the farther the gait has moved on.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from ...rotations import Floats, conjugate, multiply, slerp
+from ...steps import finished
 from ..path import distances_at
 from ..rig import ArmMotion
 from .job import MotionJob
 from .pipeline import (
     Body,
     Glimpsed,
+    KnownMotion,
     body_at,
     glimpsed,
-    moments_of,
+    way_of,
 )
 from .planning import MotionPlan, plan_near
 
 _WINDOW: Final = 12
 """Moments to either side of one of which it is found at once what the frames around them make of
 the arms; arms of an even gait are as far as the body at all of them, others within some frames."""
-
-
-@dataclass(frozen=True, eq=False)
-class KnownMotion:
-    """A motion that was worked out, or a few of its moments."""
-
-    plan: MotionPlan
-    arms: ArmMotion
-    """At some moments that follow one another …"""
-    first: int
-    """… and the number of the first of these."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,12 +61,17 @@ class Sketch:
         self._known = known
         self._made: _Made | None = None
         when = known.plan.schedule
-        distance = distances_at(when.route, when.travel, moments_of(known.plan)[1])
+        distance = distances_at(when.route, when.travel, known.plan.moments[1])
         self._strides: Floats = distance / when.travel.stride
         """(moments,) that the body has come, at all of the motion."""
+        centres, held, come = way_of(known.plan)
+        self._way = centres, held
+        along = np.linspace(0.0, 1.0, len(centres)), come / when.route.length
+        self._shares: Floats = np.clip(np.concatenate(along), 0.0, 1.0)
+        """Of the route's length at which these are."""
 
-    def may_show(self, job: MotionJob, frame: float) -> bool:
-        """Whether a motion can be drawn so at a frame: on one gait all the way, in the world as it
+    def may_show(self, job: MotionJob) -> bool:
+        """Whether a motion can be drawn so: on one gait all the way, in the world as it
         is planned, and it begins and ends as it likes; its arms and way of moving are the same.
         """
         plan, known = self._known.plan, self._known.plan.job
@@ -86,12 +83,11 @@ class Sketch:
             and job.in_place == known.in_place
             and job.creature.bones == known.creature.bones
             and _manner(job) == _manner(known)
-            and 0 <= self._number(frame) - self._known.first < len(self._known.arms.rotations)
         )
 
-    def prepare(self, frame: float) -> None:
-        """Work out beforehand what will be asked for near a frame."""
-        self._made_around(self._number(frame))
+    def preparing(self, frame: float) -> Generator[float, None, None]:
+        """Work out beforehand, in steps, what will be asked for near a frame."""
+        yield from self._making(self._known.plan.moment_of(frame))
 
     def at(self, job: MotionJob, frame: float) -> list[Glimpsed]:
         """What a motion is nearly at a frame: the values of all channels.
@@ -99,41 +95,57 @@ class Sketch:
         Raises:
             OctoMotionError: something is wrong that the user can put right.
         """
-        plan, times = plan_near(job, self._known.plan, frame)
-        body = body_at(plan, times)
-        arms = plan.segments.by_themselves(body.travel, body.places)
+        plan, number = plan_near(job, self._known.plan, frame)
+        moment = slice(number, number + 1)
+        body = body_at(plan, plan.moments[1][moment])
+        arms = finished(plan.segments.posing_by_themselves(body.travel, body.places))
         come = float(body.travel.distance[0]) / plan.schedule.travel.stride
         moments = np.arange(len(self._strides), dtype=np.float64)
         made = self._made_around(round(float(np.interp(come, self._strides, moments))))
         arms = self._with_what_is_made(made, arms, plan, body)
-        return glimpsed(plan, arms, body, np.array([frame]))
+        return glimpsed(plan, arms, body, plan.moments[0][moment])
+
+    def way(self, job: MotionJob) -> tuple[Floats, Floats]:
+        """Where a motion nearly leads, as ``way_of`` has it: places of the body's centre and of
+        footholds are as far beside the route as those that are known.
+        """
+        plan, (centres, held) = self._known.plan, self._way
+        route, before = job.route or plan.schedule.route, plan.schedule.route
+        moved = route.position(route.parameter_at(self._shares * route.length))
+        moved -= before.position(before.parameter_at(self._shares * before.length))
+        places = np.concatenate([centres, held])
+        if plan.standing:
+            ground, beside = plan.standing[0].ground, (places + moved)[:, :2]
+            moved[:, 2] = ground.height(beside) - ground.height(places[:, :2])
+        places = places + moved
+        return places[: len(centres)], places[len(centres) :]
 
     def _made_around(self, number: int) -> _Made:
         """What is made of arms around one of the moments."""
+        finished(self._making(number))
+        assert self._made is not None
+        return self._made
+
+    def _making(self, number: int) -> Generator[float, None, None]:
         known, plan = self._known, self._known.plan
         begin, end = known.first, known.first + len(known.arms.rotations)
         number = min(max(number, begin), end - 1)
-        if (made := self._made) is None or abs(number - made.middle) > _WINDOW // 2:
-            first, last = max(number - _WINDOW, begin), min(number + _WINDOW + 1, end)
-            body = body_at(plan, moments_of(plan)[1][first:last])
-            bare = plan.segments.by_themselves(body.travel, body.places)
-            whole = known.arms.at(slice(first - begin, last - begin))
-            self._made = made = _Made(
-                number,
-                _phases(plan, body),
-                multiply(conjugate(bare.rotations), whole.rotations),
-                whole.strains - bare.strains,
-            )
-        return made
-
-    def _number(self, frame: float) -> int:
-        """Number of the moment that is nearest to a frame."""
-        return int(np.abs(moments_of(self._known.plan)[0] - frame).argmin())
+        if self._made is not None and abs(number - self._made.middle) <= _WINDOW // 2:
+            return
+        first, last = max(number - _WINDOW, begin), min(number + _WINDOW + 1, end)
+        body = body_at(plan, plan.moments[1][first:last])
+        yield 0.1
+        bare = yield from plan.segments.posing_by_themselves(body.travel, body.places)
+        whole = known.arms.at(slice(first - begin, last - begin))
+        self._made = _Made(
+            number,
+            _phases(plan, body),
+            multiply(conjugate(bare.rotations), whole.rotations),
+            whole.strains - bare.strains,
+        )
 
     @staticmethod
-    def _with_what_is_made(
-        made: _Made, arms: ArmMotion, plan: MotionPlan, body: Body
-    ) -> ArmMotion:
+    def _with_what_is_made(made: _Made, arms: ArmMotion, plan: MotionPlan, body: Body) -> ArmMotion:
         """Arms at one moment, with what the frames around it make of them: of each arm what they do
         where it is as far in its cycle.
         """
@@ -149,8 +161,8 @@ class Sketch:
             here, then = made.turns[before, bones], made.turns[after, bones]
             turns = slerp(here, then, np.full(len(here), share))
             rotations[0, bones] = multiply(rotations[0, bones], turns)
-            own = made.strains[before, bones], made.strains[after, bones]
-            strains[0, bones] += own[0] + share * (own[1] - own[0])
+            here, then = made.strains[before, bones], made.strains[after, bones]
+            strains[0, bones] += here + share * (then - here)
         return replace(arms, rotations=rotations, strains=strains)
 
 

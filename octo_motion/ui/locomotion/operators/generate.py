@@ -27,6 +27,7 @@ from ....blender.animation import is_edited, may_replace
 from ....blender.rig import active_armature, deformed_meshes, read_skeleton
 from ....core.content_cache import clear_caches, content_key
 from ....core.errors import OctoMotionError, RigError
+from ....core.locomotion.motion import MotionResult, Sketch
 from ....core.phrases import phrase
 from ...declared_settings import assign, plain
 from ...language import reported, translated
@@ -78,7 +79,7 @@ class OCTO_MOTION_OT_generate_locomotion(ModalJob, ArmatureOperator, bpy.types.O
         for shot in reversed(self._shots):
             assert shot.summary is not None
             self._tell(shot.summary)
-            made(bpy.data.objects[shot.armature, None])  # type: ignore[index]
+            made(bpy.data.objects[shot.armature, None], shot.result)  # type: ignore[index]
 
     def give_up(self, context: bpy.types.Context) -> set[Any]:
         """Change nothing; motions that are there and only being measured stay."""
@@ -185,6 +186,8 @@ class _State:
     """What was read of armatures of which at most the route has changed since."""
     following: dict[str, _Work] = field(default_factory=dict)
     """Motions of which no more than the frame in sight is there, by the armature's name."""
+    sketches: dict[str, Sketch] = field(default_factory=dict)
+    """What the frame in sight is drawn from until a motion is planned, by the armature's name."""
     rates: dict[str, float] = field(default_factory=dict)
     """Frames per second of each scene."""
     complete: bool = False
@@ -244,11 +247,13 @@ def _handlers() -> list[tuple[Any, Any]]:
     ]
 
 
-def made(armature: bpy.types.Object) -> None:
+def made(armature: bpy.types.Object, result: MotionResult | None) -> None:
     """Tell that an armature's motion has just been made from its settings as they are."""
     settings = locomotion_settings(armature)
     if settings.live:
         _state.seen[armature.name] = _made_from(armature, settings)
+        if result is not None:
+            _state.sketches[armature.name] = Sketch(result.known)
     _state.following.pop(armature.name, None)
     assign(settings, "live_error", "")
 
@@ -486,7 +491,10 @@ def _before_undo(*_: object) -> None:
 @persistent
 def _after_undo(*_: object) -> None:
     """A step may have been made between a change and the motion that follows from it."""
+    # Motions are nearly what they were.
+    sketches = _state.sketches
     _state.clear()
+    _state.sketches.update(sketches)
     for armature in _live_armatures():
         _state.seen[armature.name] = None
         _soon(armature.name, certain=True)
@@ -611,14 +619,20 @@ def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> No
     """Show the frame in sight, and let the others follow."""
     earlier, known = _state.following.get(armature.name), _state.known.pop(armature.name, None)
     before = earlier.motion.before if earlier is not None and earlier.motion is not None else None
-    motion = Following(armature, bpy.context, before, known)
+    motion = Following(armature, bpy.context, before, known, _state.sketches.get(armature.name))
     _state.known[armature.name] = replace(motion.shot)
     _state.following[armature.name] = _Work(motion, Job(motion.steps()), motion.lines())
     # Whose action it is that another frame shows again is looked at before it is written.
     scene = bpy.context.scene
     if scene is not None and _generated(armature, settings):
         motion.show(armature, scene.frame_current_final)
+    _note_sketch(armature, motion)
     assign(settings, "live_error", "")
+
+
+def _note_sketch(armature: bpy.types.Object, motion: Following) -> None:
+    if motion.sketch is not None:
+        _state.sketches[armature.name] = motion.sketch
 
 
 def _go_on(name: str, seconds: float) -> None:
@@ -629,7 +643,13 @@ def _go_on(name: str, seconds: float) -> None:
         _let_go(armature, name)
         return
     with _telling(armature, settings), _window_of(armature):
-        if not work.job.work(seconds):
+        there, motion = work.job.work(seconds), work.motion
+        if motion is not None and motion.has_news:
+            with _deaf():
+                motion.tell(armature)
+            work.lines = motion.lines()
+            _note_sketch(armature, motion)
+        if not there:
             return
         with _deaf():
             _write(armature, settings, work.motion)
@@ -654,6 +674,7 @@ def _write(
         # What was found is what is set from now on.
         _state.known.pop(armature.name, None)
     motion.write()
+    _note_sketch(armature, motion)
     # Markers of contacts are where the motion has them now.
     _state.seen[armature.name] = _made_from(armature, settings)
     if motion.exact:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import bpy
@@ -17,7 +17,18 @@ from ....blender.animation import (
     shown_values,
 )
 from ....blender.rig import bone_and_property
-from ....core.locomotion.motion import glimpse, pose, way_of
+from ....core.locomotion.motion import (
+    Glimpsed,
+    KnownMotion,
+    MotionPlan,
+    Sketch,
+    glimpse,
+    plan_motion,
+    pose,
+    reach_of,
+    way_of,
+)
+from ....core.steps import finished
 from ...overlay_lines import Lines
 from ..reading import previous_action
 from ..settings import locomotion_settings
@@ -39,6 +50,7 @@ class Following:
         context: with its scene.
         before: of what was being followed, and takes the place of the motion itself.
         known: the shot as it was read last, if nothing but the route has changed since.
+        sketch: of a motion that this is nearly like, if there is one.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
@@ -50,26 +62,42 @@ class Following:
         context: bpy.types.Context,
         before: PropertyValues | None = None,
         known: Shot | None = None,
+        sketch: Sketch | None = None,
     ) -> None:
         self.shot: Shot = (
             rerouted(known, armature, context)
             if known is not None
             else prepare(armature, context, live=True)
         )
-        self._plan = plan = self.shot.plan()
-        few = locomotion_settings(armature).keys == "REDUCED"
-        self.exact = not few and plan.wants_subframes == plan.subframe_sampled
-        """Whether what is written has the keys that Generate makes."""
         self.before: PropertyValues = before if before is not None else {}
         """What the armature was before anything was shown."""
+        self.sketch = sketch if sketch is not None and sketch.may_show(self.shot.job) else None
+        """What it is drawn from; none where all that is shown of it is as it will be."""
+        self._plan: MotionPlan | None = None if self.sketch is not None else self.shot.plan()
+        self._few = locomotion_settings(armature).keys == "REDUCED"
+        self._frame: float | None = None
+        """The one in sight, none while nothing is shown."""
+        self._news: tuple[float, Sequence[Glimpsed]] | None = None
+        """What has come to be known of a frame."""
+
+    @property
+    def exact(self) -> bool:
+        """Whether what is written has the keys that Generate makes."""
+        plan = self._plan
+        assert plan is not None
+        return not self._few and plan.wants_subframes == plan.subframe_sampled
 
     def lines(self) -> Lines:
         """The body's way and its footholds, as lines in the world; nothing in place."""
         job = self.shot.job
         if job.in_place:
             return []
-        centres, held = way_of(self._plan)
-        size = _MARK * self._plan.first.poser.arm_length * job.creature.scale
+        if self._plan is None:
+            assert self.sketch is not None
+            centres, held = self.sketch.way(job)
+        else:
+            centres, held, _ = way_of(self._plan)
+        size = _MARK * reach_of(job.creature)
         ends = size * np.eye(3)[:2]
         marks = np.stack([held[:, None] - ends, held[:, None] + ends], axis=2).reshape(-1, 3)
         path = np.repeat(centres, 2, axis=0)[1:-1]
@@ -79,16 +107,27 @@ class Following:
         ]
 
     def show(self, armature: bpy.types.Object, frame: float) -> None:
-        """Let the armature be as it is going to be at a frame.
+        """Let the armature be as it is going to be at a frame, or nearly so until it is planned.
 
         Reaches are left out of that: what they reach for hangs on all frames.
 
         Raises:
             OctoMotionError: something is wrong that the user can put right.
         """
-        if self.shot.job.reaching is not None:
+        job = self.shot.job
+        if job.reaching is not None:
             return
-        values = {each.data_path: each.values.tolist() for each in glimpse(self._plan, frame)}
+        self._frame = frame
+        if self._plan is None:
+            assert self.sketch is not None
+            values = self.sketch.at(job, frame)
+        else:
+            glimpsed = finished(glimpse(self._plan, frame))
+            self.sketch, values = self.sketch or Sketch(glimpsed.known), glimpsed.values
+        self._give(armature, values)
+
+    def _give(self, armature: bpy.types.Object, glimpsed: Sequence[Glimpsed]) -> None:
+        values = {each.data_path: each.values.tolist() for each in glimpsed}
         for path in self._stretched(armature) - values.keys():
             values[path] = [0.0 if path.endswith(".location") else 1.0] * 3
         new = [path for path in values if path not in self.before]
@@ -111,8 +150,41 @@ class Following:
         self.before.clear()
 
     def steps(self) -> Iterator[float]:
-        """Work all of it out, yielding the share that is done."""
-        self.shot.result = yield from pose(self._plan, brief=True)
+        """Work all of it out, yielding the share that is done.
+
+        What was shown nearly as it will be comes first, and is told by :meth:`tell`.
+        """
+        if self._plan is None:
+            plan = yield from plan_motion(self.shot.job)
+            self._plan = plan
+            if self._frame is not None:
+                frame = self._frame
+                glimpsed = yield from glimpse(plan, frame)
+                self._news = frame, glimpsed.values
+                yield 0.0
+                yield from self._sketched(glimpsed.known)
+        result = yield from pose(self._plan, brief=True)
+        yield from self._sketched(result.known)
+        self.shot.result = result
+
+    def _sketched(self, known: KnownMotion) -> Iterator[float]:
+        """Let the next change be drawn from what is known now."""
+        sketch = Sketch(known)
+        yield 1.0
+        yield from sketch.preparing(self._frame or 0.0)
+        self.sketch = sketch
+
+    @property
+    def has_news(self) -> bool:
+        """Whether it has come to be known how what was nearly shown will be."""
+        return self._news is not None
+
+    def tell(self, armature: bpy.types.Object) -> None:
+        """Show that."""
+        assert self._news is not None
+        (frame, values), self._news = self._news, None
+        if frame == self._frame:
+            self._give(armature, values)
 
     def write(self) -> None:
         """Give the armature its motion; that the one before is not edited is known."""
