@@ -73,6 +73,10 @@ class ContentCache(Generic[_Result]):
             self._kept.popitem(last=False)
         return made
 
+    def known(self, key: bytes) -> _Result | None:
+        """What was made for this key, none if nothing is kept of it."""
+        return self._kept.get(key)
+
     def __len__(self) -> int:
         """How many results are kept."""
         return len(self._kept)

@@ -154,6 +154,9 @@ def pseudo_targets(rotations: Floats, widths: Floats) -> Floats:
 SWEEPS: Final = 4
 """Sweeps of CCD over a group. Two or eight change slip, overlap and turns of the ten set-ups on
 bumps by less than a tenth."""
+ROUGH_SWEEPS: Final = 1
+ROUGH_SOFTENINGS: Final = 1
+"""The same of what is to be soon known, and may be off."""
 SOFTENINGS: Final = 4
 """How often bends are spread and the groups closed again. With two Swim has a jerk (as in
 ``ground/stance_swing``) of 0.085 instead of 0.073, with eight it turns by 0.28 radians from frame
@@ -234,6 +237,7 @@ def solving_ccd(
     softness: float = 0.8,
     stretch_slack: float = 0.0,
     floor: Floats | None = None,
+    rough: bool = False,
 ) -> Iterator[Floats]:
     """Directions (segments, 3, batch) of arms whose groups end at their targets: as far as they are
     found after each of some steps, the last ones are the answer.
@@ -250,18 +254,20 @@ def solving_ccd(
         stretch_slack: group lengths by which a group may reach beyond its target as it straightens.
         floor: (batch,) height that joints between the groups' ends keep above, as far as the
             targets let them.
+        rough: whether fewer sweeps do, and the shape may differ a little.
     """
-    directions = np.empty_like(shape)
+    directions, sweeps = np.empty_like(shape), ROUGH_SWEEPS if rough else SWEEPS
     root = np.zeros_like(targets[0])
     for group, segments in enumerate(chain.groups):
         lengths, goal = chain.lengths[segments], targets[group + 1] - root
         own = aimed(components_first.rotate(links[group], shape[segments]), lengths, goal)
-        for _ in range(SWEEPS if len(own) > 1 else 0):
+        for _ in range(sweeps if len(own) > 1 else 0):
             own = swept(own, lengths, chain.weights[segments], goal)
         directions[segments] = close_group(own, lengths, goal, stretch_slack=stretch_slack)
         root = root + chord(directions[segments], lengths)
         yield directions
     iterations = SOFTENINGS if softness > 0.0 or floor is not None else 0
+    iterations = min(iterations, ROUGH_SOFTENINGS) if rough else iterations
     for number in range(1, iterations + 1):
         before = directions
         for _ in range(_SPREADS):

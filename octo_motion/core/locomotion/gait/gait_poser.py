@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Final
@@ -112,7 +113,9 @@ _CHUNK: Final = 4096
 _FEW: Final = 100
 """Shapes that are kept: of a few arms at a few frames, which cost as much to start as many."""
 _CYCLE_SAMPLES: Final = 96
-"""Phases at which a cycle is looked at as a whole."""
+"""Phases at which a cycle is looked at as a whole …"""
+_ROUGH_SAMPLES: Final = 24
+"""… and of what is to be soon known."""
 _RESTING: Final = 0.5
 """Share of what arms differ by in the water that is left where they rest on the ground in place:
 what lies there is not to creep."""
@@ -304,10 +307,19 @@ class GaitPoser:
     """(arms, 4) from an arm's own frame, x outward and z up, to the body's."""
     rests: Final[tuple[ArmRest, ...]]
     """Each arm at rest."""
+    rough: bool
+    """Whether arms that hold the ground are soon found, and may be a little off."""
 
     def __init__(
-        self, skeleton: Skeleton, arms: Sequence[Arm], body: BodyFrame, settings: GaitSettings
+        self,
+        skeleton: Skeleton,
+        arms: Sequence[Arm],
+        body: BodyFrame,
+        settings: GaitSettings,
+        *,
+        rough: bool = False,
     ) -> None:
+        self.rough = rough
         if not arms:
             raise RigError("The list of arms is empty.", "Detect the arms, or add one.")
         self.arms = tuple(arms)
@@ -357,6 +369,12 @@ class GaitPoser:
             if floor < -_LEAST_DEPTH * self.arm_length:
                 self._floor = floor
 
+    def roughly(self) -> GaitPoser:
+        """The same, but rough."""
+        result = copy(self)
+        result.rough = True
+        return result
+
     @property
     def bones(self) -> tuple[str, ...]:
         """Names of the bones that are turned, in the order of ``ArmPoses.rotations``."""
@@ -387,10 +405,11 @@ class GaitPoser:
         (segments, 3) are those of each arm half way through its stance.
         """
         gait = self.settings.gait
-        phases = np.linspace(0.0, 2.0 * np.pi, _CYCLE_SAMPLES, endpoint=False)
+        samples = _ROUGH_SAMPLES if self.rough else _CYCLE_SAMPLES
+        phases = np.linspace(0.0, 2.0 * np.pi, samples, endpoint=False)
         phases = np.append(phases, gait.power_phase)
         heights = self.roots[:, 2] / self.lengths
-        depths = np.empty((_CYCLE_SAMPLES, len(self.arms)))
+        depths = np.empty((samples, len(self.arms)))
         middles: dict[int, Floats] = {}
         for build in self.builds:
             same: dict[tuple[int, float], list[int]] = {}
@@ -409,7 +428,7 @@ class GaitPoser:
             climbs = cumulative_sum(build.chain.lengths[:, None, None] * directions[:, 2])
             lowest = np.minimum(climbs.min(axis=0), 0.0)
             for place, arms in enumerate(same.values()):
-                low = lowest[:_CYCLE_SAMPLES, place, None]
+                low = lowest[:samples, place, None]
                 depths[:, arms] = self.roots[arms, 2] + self.lengths[arms] * low
                 for arm in arms:
                     middles[arm] = directions[:, :, -1, place].copy()
@@ -529,14 +548,16 @@ class GaitPoser:
         angles: Floats,
         steering: Floats,
         asked: tuple[Floats, Floats, Floats | None],
+        *,
+        rough: bool = False,
     ) -> Iterator[Floats]:
-        """Directions as of :meth:`shapes`, as far as they are found after each of some steps; the
-        last ones are the answer. What is asked is from :meth:`chains`.
+        """Directions as of :meth:`shapes`, or roughly so, as far as they are found after each of
+        some steps; the last ones are the answer. What is asked is from :meth:`chains`.
         """
         steered = angles[..., [HEAD, PITCH]]
         steered[..., 0, 1] += steering
         sway = self._sway[list(build.arms)]
-        for directions in _solving(build, self.settings, sway, steered, asked):
+        for directions in _solving(build, self.settings, sway, steered, asked, rough=rough):
             yield directions.reshape(len(directions), 3, *angles.shape[:2])
 
     def chains(
@@ -591,6 +612,8 @@ def _solving(
     sway: Floats,
     steered: Floats,
     asked: tuple[Floats, Floats, Floats | None],
+    *,
+    rough: bool,
 ) -> Iterator[Floats]:
     """Directions (segments, 3, frames · arms), in steps, of what :meth:`GaitPoser.chains` asks for,
     at heads and pitches (frames, arms, links, 2) with sways (arms, 2).
@@ -607,6 +630,7 @@ def _solving(
         softness=settings.softness,
         stretch_slack=settings.stretch_slack,
         floor=None if floor is None else np.tile(floor, frames),
+        rough=rough,
     )
 
 

@@ -265,7 +265,9 @@ class WalkPart:
         angles, steering = moments.angles[:, every], moments.steering[:, every]
         chains = self.poser.chains(self.build, angles, steering)
         directions = np.zeros(0)
-        for found in self.poser.shaping(self.build, angles, steering, chains):
+        for found in self.poser.shaping(
+            self.build, angles, steering, chains, rough=self.poser.rough
+        ):
             directions = found
             yield
         return directions

@@ -371,31 +371,35 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     return plan
 
 
-def plan_near(job: MotionJob, known: MotionPlan, frame: float) -> tuple[MotionPlan, int]:
-    """A plan for one frame of a motion, from that of one that is nearly the same; with it comes the
-    number of that moment.
+def plan_near(
+    job: MotionJob, known: MotionPlan, first: float, last: float
+) -> Generator[float, None, tuple[MotionPlan, slice]]:
+    """A rough plan for a motion from one frame to another, in steps, from that of a motion that is
+    nearly the same; with it come the numbers of the moments there.
 
     Both have one gait all the way. What has little to do with where the arms are is taken over.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
-    when, gait = schedule(job), job.gaits[0]
+    when, gait, before = schedule(job), job.gaits[0], known.first.standing
     plan = replace(known, job=job, schedule=when)
-    number = plan.moment_of(frame)
-    times = plan.moments[1][number : number + 1]
-    near = None
-    if (before := known.first.standing) is not None:
-        near = Nearby(before, float(distances_at(when.route, when.travel, times)[0]))
-    poser = _poser(job, gait, when.lean)
-    first = _gait(job, gait, poser, when.route, lean=when.lean, plane=None, near=near)
-    walk = None
-    if first.standing is not None:
+    moments, near = slice(plan.moment_of(first), plan.moment_of(last) + 1), None
+    if before is not None:
+        distance = distances_at(when.route, when.travel, plan.moments[1][moments])
+        near = Nearby(before, float(distance[0]), float(distance[-1]))
+    poser = _poser(job, gait, when.lean, rough=True)
+    yield 0.3
+    moving = _gait(job, gait, poser, when.route, lean=when.lean, plane=None, near=near)
+    yield 0.7
+    walk, standing = None, moving.standing
+    if standing is not None:
         asked = job.ground.overrides if job.ground is not None and not job.in_place else ()
-        walk = first.standing.walk(first.standing.line, asked)
+        walk = standing.walk(standing.line, asked)
     bones = [len(each) for each in job.creature.bones]
-    segments = Segments([first], [walk], None, bones, when.route)
-    return replace(plan, segments=segments), number
+    segments = Segments([moving], [walk], None, bones, when.route)
+    yield 1.0
+    return replace(plan, segments=segments), moments
 
 
 def _along(
@@ -493,11 +497,21 @@ def reach_of(creature: Creature) -> float:
     return float(np.array(lengths).mean()) * creature.scale
 
 
-def _poser(job: MotionJob, gait: GaitJob, lean: float) -> GaitPoser:
-    """What moves the arms in a gait, the same as before while nothing of it has changed."""
+def _poser(job: MotionJob, gait: GaitJob, lean: float, *, rough: bool = False) -> GaitPoser:
+    """What moves the arms in a gait, roughly or not, the same as before while nothing of it has
+    changed.
+    """
     settings = replace(gait.settings, swim_lean=0.0 if gait.settings.gait.on_ground else lean)
     moved = job.creature.skeleton, job.creature.arms, job.creature.body, settings
-    return _posers.get(content_key(*moved), lambda: GaitPoser(*moved))
+    exact = content_key(*moved)
+    if not rough:
+        return _posers.get(exact, lambda: GaitPoser(*moved))
+
+    def roughly() -> GaitPoser:
+        known = _posers.known(exact)
+        return GaitPoser(*moved, rough=True) if known is None else known.roughly()
+
+    return _posers.get(exact + b"roughly", roughly)
 
 
 def _travel(job: MotionJob, gait: GaitJob, lean: float) -> TravelSettings:

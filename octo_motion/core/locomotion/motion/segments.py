@@ -171,21 +171,23 @@ class Nearby:
     """A walk that is nearly the same, and where on its way the body is that is asked for."""
 
     standing: Standing
-    middle: float
-    """Metres along the route."""
+    start: float
+    """Metres along the route, from there …"""
+    end: float
+    """… to there."""
 
     def around(self, stride: float, length: float) -> tuple[float, float]:
         """Metres along the route from where to where there is anything that matters there."""
         away = _AROUND_STRIDES * stride
-        return max(self.middle - away, 0.0), min(self.middle + away, length)
+        return max(self.start - away, 0.0), min(self.end + away, length)
 
     def phases(self, stride: float) -> tuple[float, float]:
         """The first and the last phase, radians, of the body that is asked for."""
-        return (CYCLE / stride * self.middle,) * 2
+        return CYCLE / stride * self.start, CYCLE / stride * self.end
 
     def as_rested(self, job: GroundJob, stride: float, length: float) -> GroundJob:
         """The same without what arms do as the body stands at its ends, where it is far off."""
-        near_end = min(self.middle, length - self.middle) < _RESTED_STRIDES * stride
+        near_end = min(self.start, length - self.end) < _RESTED_STRIDES * stride
         return job if near_end else replace(job, rest=(False, False))
 
     def same_ground(self, job: GroundJob, route: Route, reach: float) -> bool:

@@ -40,14 +40,26 @@ the arms; arms of an even gait are as far as the body at all of them, others wit
 class _Made:
     """What the frames around them make of arms, at some moments around a frame."""
 
-    middle: int
-    """Number of the moment around which they are."""
+    first: int
+    """Number of the first of these moments …"""
+    known: tuple[int, int]
+    """… and of the first and the last that there might be."""
     phases: Floats
     """(moments, arms) radians, never less than at the moment before."""
+    shifts: Floats
+    """(moments, 3) metres that the body is beside where it is roughly."""
     turns: Floats
     """(moments, bones, 4) what bones are turned by, each in its own frame …"""
     strains: Floats
     """… and (moments, bones) by how much they are longer."""
+
+    def has(self, number: int) -> bool:
+        """Whether a moment is well among them, or at an end of all that is known."""
+        last, (begin, end) = self.first + len(self.phases), self.known
+        far = _WINDOW // 2
+        return (self.first == begin or number >= self.first + far) and (
+            last == end or number < last - far
+        )
 
 
 class Sketch:
@@ -95,14 +107,16 @@ class Sketch:
         Raises:
             OctoMotionError: something is wrong that the user can put right.
         """
-        plan, number = plan_near(job, self._known.plan, frame)
-        moment = slice(number, number + 1)
+        plan, moment = finished(plan_near(job, self._known.plan, frame, frame))
         body = body_at(plan, plan.moments[1][moment])
         arms = finished(plan.segments.posing_by_themselves(body.travel, body.places))
         come = float(body.travel.distance[0]) / plan.schedule.travel.stride
         moments = np.arange(len(self._strides), dtype=np.float64)
-        made = self._made_around(round(float(np.interp(come, self._strides, moments))))
+        near = round(float(np.interp(come, self._strides, moments)))
+        made = self._made_around(near)
         arms = self._with_what_is_made(made, arms, plan, body)
+        beside = made.shifts[min(max(near - made.first, 0), len(made.shifts) - 1)]
+        body = replace(body, keyed=(body.keyed[0] + beside, body.keyed[1]))
         return glimpsed(plan, arms, body, plan.moments[0][moment])
 
     def way(self, job: MotionJob) -> tuple[Floats, Floats]:
@@ -130,16 +144,22 @@ class Sketch:
         known, plan = self._known, self._known.plan
         begin, end = known.first, known.first + len(known.arms.rotations)
         number = min(max(number, begin), end - 1)
-        if self._made is not None and abs(number - self._made.middle) <= _WINDOW // 2:
+        if self._made is not None and self._made.has(number):
             return
         first, last = max(number - _WINDOW, begin), min(number + _WINDOW + 1, end)
-        body = body_at(plan, plan.moments[1][first:last])
+        frames, times = plan.moments
+        there = body_at(plan, times[first:last])
         yield 0.1
+        plan, part = yield from plan_near(plan.job, plan, frames[first], frames[last - 1])
+        body = body_at(plan, plan.moments[1][part])
+        yield 0.5
         bare = yield from plan.segments.posing_by_themselves(body.travel, body.places)
         whole = known.arms.at(slice(first - begin, last - begin))
         self._made = _Made(
-            number,
+            first,
+            (begin, end),
             _phases(plan, body),
+            there.keyed[0] - body.keyed[0],
             multiply(conjugate(bare.rotations), whole.rotations),
             whole.strains - bare.strains,
         )
