@@ -169,7 +169,9 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     yield moving
     arms, keyed, reached = posed.arms, posed.keyed, posed.reached
     warnings = [*plan.warnings, *posed.warnings]
-    motion, further = _motion(plan, posed, moments)
+    organs = organs_at(plan, moments, keyed, posed.swimming)
+    yield moving
+    motion, further = _motion(plan, posed, moments, organs)
     yield moving
     on_frames = arms.at(slice(None, None, every))
     # The ground is as it was planned on.
@@ -389,22 +391,28 @@ def glimpse(plan: MotionPlan, frame: float) -> Steps[Glimpse]:
     if posed.hands:
         _hand_over(plan, posed)
     yield 1.0
-    values = _values(plan, posed, moments[first:last], middle - first)
+    organs = organs_at(plan, moments[first:last], posed.keyed, posed.swimming)
+    yield 1.0
+    values = _values(plan, posed, moments[first:last], middle - first, organs)
     # What is far from the middle hangs on more than these moments.
     within = max(middle - around // 2, 0)
     part = slice(within - first, middle - first + around // 2 + 1)
     return Glimpse(values, KnownMotion(plan, posed.arms.at(part), within))
 
 
-def glimpsed(plan: MotionPlan, arms: ArmMotion, body: Body, moments: Floats) -> list[Glimpsed]:
-    """The values of all channels at one moment (1,), of a body with its arms there."""
+def glimpsed(
+    plan: MotionPlan, arms: ArmMotion, body: Body, moments: Floats, organs: OrganPoses
+) -> list[Glimpsed]:
+    """The values of all channels at one moment (1,), of a body with its arms and organs there."""
     posed = _Posed(arms, body.going, body.going, body.keyed, None, None, [], [], None)
-    return _values(plan, posed, moments, 0)
+    return _values(plan, posed, moments, 0, organs)
 
 
-def _values(plan: MotionPlan, posed: _Posed, moments: Floats, number: int) -> list[Glimpsed]:
+def _values(
+    plan: MotionPlan, posed: _Posed, moments: Floats, number: int, organs: OrganPoses
+) -> list[Glimpsed]:
     """The values of all channels at one of some moments (moments,), by its number."""
-    motion, further = _motion(plan, posed, moments, every_width=True)
+    motion, further = _motion(plan, posed, moments, organs, every_width=True)
     # A scale of 1 as well: what it is elsewhere in the motion is not known here.
     channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.widths, *motion.stretch]
     channels = plan.job.creature.channels.written([*channels, *further])
@@ -752,7 +760,7 @@ def _rolled_up(plan: MotionPlan, measured: Measured, posed: _Posed) -> Measured:
     )
 
 
-def _organs(
+def organs_at(
     plan: MotionPlan, frames: Floats, keyed: Travelled, swimming: Floats | None
 ) -> OrganPoses:
     """What the body does by itself at frames (moments,), which need not be whole."""
@@ -776,14 +784,18 @@ def _organs(
 
 
 def _motion(
-    plan: MotionPlan, posed: _Posed, moments: Floats, *, every_width: bool = False
+    plan: MotionPlan,
+    posed: _Posed,
+    moments: Floats,
+    organs: OrganPoses,
+    *,
+    every_width: bool = False,
 ) -> tuple[Motion, list[Channel]]:
     """What was computed, as channels with a key at every moment (moments,), and those of what only
     poses have that it begins or ends in.
     """
     arms, keyed, hands = posed.arms, posed.keyed, posed.hands
     creature, channels = plan.job.creature, plan.job.creature.channels
-    organs = _organs(plan, moments, keyed, posed.swimming)
     if hands:
         organs = hand_over_organs(hands, organs)
     if bone := creature.root_bone:

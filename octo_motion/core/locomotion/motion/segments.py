@@ -90,7 +90,7 @@ _AROUND_STRIDES: Final = 1.0
 """Strides of the way to either side of a place that the arms there hang on …"""
 _RESTED_STRIDES: Final = 2.0
 """… and from either end within which it matters to them whether the body stands there."""
-_ASIDE: Final = 0.5
+_ASIDE: Final = 0.7
 """Arm lengths that a route may lie beside another one whose ground is taken over …"""
 _LOOKS_ALONG: Final = 33
 """… and at how many places that is looked at."""

@@ -16,8 +16,10 @@ from typing import Final
 
 import numpy as np
 
+from ...content_cache import content_key
 from ...rotations import Floats, conjugate, multiply, slerp
 from ...steps import finished
+from ..body import OrganPoses
 from ..path import distances_at
 from ..rig import ArmMotion
 from .job import MotionJob
@@ -27,6 +29,7 @@ from .pipeline import (
     KnownMotion,
     body_at,
     glimpsed,
+    organs_at,
     way_of,
 )
 from .planning import MotionPlan, plan_near
@@ -72,6 +75,8 @@ class Sketch:
     def __init__(self, known: KnownMotion) -> None:
         self._known = known
         self._made: _Made | None = None
+        self._organs: tuple[float, OrganPoses] | None = None
+        self._body = _body_key(known.plan.job)
         when = known.plan.schedule
         distance = distances_at(when.route, when.travel, known.plan.moments[1])
         self._strides: Floats = distance / when.travel.stride
@@ -95,6 +100,7 @@ class Sketch:
             and job.in_place == known.in_place
             and job.creature.bones == known.creature.bones
             and _manner(job) == _manner(known)
+            and _body_key(job) == self._body
         )
 
     def preparing(self, frame: float) -> Generator[float, None, None]:
@@ -117,7 +123,10 @@ class Sketch:
         arms = self._with_what_is_made(made, arms, plan, body)
         beside = made.shifts[min(max(near - made.first, 0), len(made.shifts) - 1)]
         body = replace(body, keyed=(body.keyed[0] + beside, body.keyed[1]))
-        return glimpsed(plan, arms, body, plan.moments[0][moment])
+        frames = plan.moments[0][moment]
+        if self._organs is None or self._organs[0] != frame:
+            self._organs = frame, organs_at(plan, frames, body.keyed, None)
+        return glimpsed(plan, arms, body, frames, self._organs[1])
 
     def way(self, job: MotionJob) -> tuple[Floats, Floats]:
         """Where a motion nearly leads, as ``way_of`` has it: places of the body's centre and of
@@ -125,9 +134,14 @@ class Sketch:
         """
         plan, (centres, held) = self._known.plan, self._way
         route, before = job.route or plan.schedule.route, plan.schedule.route
-        moved = route.position(route.parameter_at(self._shares * route.length))
-        moved -= before.position(before.parameter_at(self._shares * before.length))
         places = np.concatenate([centres, held])
+        if route is before:
+            return centres, held
+        there, here = (
+            each.position(each.parameter_near(self._shares * each.length))
+            for each in (route, before)
+        )
+        moved = there - here
         if plan.standing:
             ground, beside = plan.standing[0].ground, (places + moved)[:, :2]
             moved[:, 2] = ground.height(beside) - ground.height(places[:, :2])
@@ -169,21 +183,19 @@ class Sketch:
         """Arms at one moment, with what the frames around it make of them: of each arm what they do
         where it is as far in its cycle.
         """
-        rotations, strains = arms.rotations.copy(), arms.strains.copy()
-        last = len(made.phases) - 1
-        for arm, (own, wanted) in enumerate(
-            zip(made.phases.T, _phases(plan, body)[0].tolist(), strict=True)
-        ):
-            bones = plan.segments.bones_of[arm]
-            place = float(np.interp(wanted, own, np.arange(last + 1.0)))
-            before = min(int(place), max(last - 1, 0))
-            after, share = min(before + 1, last), place - before
-            here, then = made.turns[before, bones], made.turns[after, bones]
-            turns = slerp(here, then, np.full(len(here), share))
-            rotations[0, bones] = multiply(rotations[0, bones], turns)
-            here, then = made.strains[before, bones], made.strains[after, bones]
-            strains[0, bones] += here + share * (then - here)
-        return replace(arms, rotations=rotations, strains=strains)
+        last, numbers = len(made.phases) - 1, np.arange(float(len(made.phases)))
+        wanted = zip(_phases(plan, body)[0].tolist(), made.phases.T, strict=True)
+        places = np.array([np.interp(phase, own, numbers) for phase, own in wanted])
+        places = np.repeat(places, plan.segments.bones)
+        before = np.minimum(places.astype(np.int64), max(last - 1, 0))
+        after, share, bones = np.minimum(before + 1, last), places - before, np.arange(len(places))
+        turns = slerp(made.turns[before, bones], made.turns[after, bones], share)
+        here, then = made.strains[before, bones], made.strains[after, bones]
+        return replace(
+            arms,
+            rotations=multiply(arms.rotations, turns),
+            strains=arms.strains + here + share * (then - here),
+        )
 
 
 def _phases(plan: MotionPlan, body: Body) -> Floats:
@@ -192,6 +204,15 @@ def _phases(plan: MotionPlan, body: Body) -> Floats:
     if walk is None:
         return np.repeat(phase[:, None], len(plan.segments.bones), axis=1)
     return walk.arm_phases(phase)
+
+
+def _body_key(job: MotionJob) -> bytes:
+    """A key of what a body does by itself, whatever its arms do."""
+    body = job.body
+    return content_key(
+        *(body.settings, body.breathing, body.unlike, body.seed, body.look_at, job.streamline),
+        job.timing.rate,
+    )
 
 
 def _manner(job: MotionJob) -> tuple[bool, str]:

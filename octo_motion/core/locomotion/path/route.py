@@ -254,6 +254,11 @@ class Route:
         s = np.where(flat <= 0.0, 0.0, np.where(flat >= self.length, 1.0, s))
         return s.reshape(wanted.shape)
 
+    def parameter_near(self, distance: ArrayLike) -> Floats:
+        """The same to about a thousandth of a segment, which is soon found."""
+        wanted = np.clip(np.asarray(distance, dtype=np.float64), 0.0, self.length)
+        return np.clip(_looked_up(self._places, wanted), 0.0, 1.0)
+
     @cached_property
     def _places(self) -> tuple[Floats, Floats, Floats]:
         """Distances (n,), parameters there, and how much these grow with a metre."""

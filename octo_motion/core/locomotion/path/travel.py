@@ -34,11 +34,12 @@ from .along_route import PacedTime, Stops, ValuesAlong
 from .route import Route
 
 _FEWEST: Final = 1024
-_FEWEST_COARSE: Final = 192
 _MOST: Final = 32768
 """Intervals of the table."""
 _PER_CORNER: Final = 8
-"""Intervals of the table within the corner radius."""
+"""Intervals of the table within the corner radius, at least four …"""
+_PER_CORNER_COARSE: Final = 4
+"""… and of one that is soon made."""
 _MOST_CORNER: Final = 1.0 / 24.0
 """Corner radius as a share of the route, at most."""
 _TAIL: Final = 12.0
@@ -120,17 +121,19 @@ class Bearings:
         return cubic + 0.5 * t * (1.0 - t) * ((1.0 - t) * slope - t * reach)
 
 
-def bearings(route: Route, corner: float, settle: float, *, fewest: int = _FEWEST) -> Bearings:
-    """The table of a route, of so many places at least.
+def bearings(route: Route, corner: float, settle: float, *, coarse: bool = False) -> Bearings:
+    """The table of a route, or a coarse one.
 
     Before and after a sharp corner most of it is turned through within some metres; within others,
     a body that is not upright comes most of the way to settle there.
     """
     corner = min(corner, _MOST_CORNER * route.length)
-    count = int(np.clip(np.ceil(_PER_CORNER * route.length / corner), fewest, _MOST))
+    per_corner, fewest = (_PER_CORNER_COARSE, 0) if coarse else (_PER_CORNER, _FEWEST)
+    count = int(np.clip(np.ceil(per_corner * route.length / corner), fewest, _MOST))
     spacing = route.length / count
     corner = max(corner, 4.0 * spacing)
-    samples = route.parameter_at(np.linspace(0.0, route.length, count + 1))
+    distances = np.linspace(0.0, route.length, count + 1)
+    samples = route.parameter_near(distances) if coarse else route.parameter_at(distances)
     raw = route.tangent(_past_joints(samples, route.breaks))
     travel = _rounded(raw, exp(-spacing / corner), int(_TAIL * corner / spacing), route.cyclic)
 
@@ -517,10 +520,9 @@ def bearings_of(route: Route, settings: TravelSettings, *, coarse: bool = False)
     A coarse one is soon made, and turns by less than a degree otherwise.
     """
     corner, settle = settings.corner * settings.stride, _SETTLE * settings.stride
-    fewest = _FEWEST_COARSE if coarse else _FEWEST
     return _tables.get(
-        content_key(route, corner, settle, fewest),
-        lambda: bearings(route, corner, settle, fewest=fewest),
+        content_key(route, corner, settle, coarse),
+        lambda: bearings(route, corner, settle, coarse=coarse),
     )
 
 

@@ -618,7 +618,7 @@ def _telling(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) ->
 def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> None:
     """Show the frame in sight, and let the others follow."""
     earlier, known = _state.following.get(armature.name), _state.known.pop(armature.name, None)
-    before = earlier.motion.before if earlier is not None and earlier.motion is not None else None
+    before = earlier.motion if earlier is not None else None
     motion = Following(armature, bpy.context, before, known, _state.sketches.get(armature.name))
     _state.known[armature.name] = replace(motion.shot)
     _state.following[armature.name] = _Work(motion, Job(motion.steps()), motion.lines())

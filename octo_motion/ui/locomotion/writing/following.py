@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import Final
 
 import bpy
@@ -40,6 +41,16 @@ _MARK: Final = 0.03
 """Arm lengths: half of a foothold's mark."""
 
 
+@dataclass
+class Shown:
+    """What an armature was like before any frame was shown in place of its action's."""
+
+    before: PropertyValues = field(default_factory=dict)
+    """Values by path."""
+    moved: set[str] | None = None
+    """Paths of scales and locations of arms' bones that its action moves, once they are known."""
+
+
 class Following:
     """One armature's motion as its settings are now, of which nothing is written yet.
 
@@ -48,7 +59,7 @@ class Following:
     Args:
         armature: that moves.
         context: with its scene.
-        before: of what was being followed, and takes the place of the motion itself.
+        earlier: what was being followed, and is no more.
         known: the shot as it was read last, if nothing but the route has changed since.
         sketch: of a motion that this is nearly like, if there is one.
 
@@ -60,7 +71,7 @@ class Following:
         self,
         armature: bpy.types.Object,
         context: bpy.types.Context,
-        before: PropertyValues | None = None,
+        earlier: Following | None = None,
         known: Shot | None = None,
         sketch: Sketch | None = None,
     ) -> None:
@@ -69,8 +80,7 @@ class Following:
             if known is not None
             else prepare(armature, context, live=True)
         )
-        self.before: PropertyValues = before if before is not None else {}
-        """What the armature was before anything was shown."""
+        self.shown: Shown = earlier.shown if earlier is not None else Shown()
         self.sketch = sketch if sketch is not None and sketch.may_show(self.shot.job) else None
         """What it is drawn from; none where all that is shown of it is as it will be."""
         self._plan: MotionPlan | None = None if self.sketch is not None else self.shot.plan()
@@ -130,24 +140,27 @@ class Following:
         values = {each.data_path: each.values.tolist() for each in glimpsed}
         for path in self._stretched(armature) - values.keys():
             values[path] = [0.0 if path.endswith(".location") else 1.0] * 3
-        new = [path for path in values if path not in self.before]
-        self.before.update(shown_values(armature, new))
+        new = [path for path in values if path not in self.shown.before]
+        self.shown.before.update(shown_values(armature, new))
         show_values(armature, values)
 
     def _stretched(self, armature: bpy.types.Object) -> set[str]:
         """Paths of scales and locations of the arms' bones that a motion before has moved."""
-        previous = previous_action(armature, locomotion_settings(armature))
-        paths = {path for path in self.before if path.endswith(LENGTH)}
-        for kind in LENGTH:
-            bones = animated_bones(previous, (kind,)) if previous is not None else set[str]()
-            paths |= {f'pose.bones["{bpy.utils.escape_identifier(each)}"].{kind}' for each in bones}
-        own = {bone for arm in self.shot.job.creature.bones for bone in arm}
-        return {path for path in paths if bone_and_property(path)[0] in own}
+        if self.shown.moved is None:
+            previous = previous_action(armature, locomotion_settings(armature))
+            paths = {path for path in self.shown.before if path.endswith(LENGTH)}
+            for kind in LENGTH:
+                bones = animated_bones(previous, (kind,)) if previous is not None else set[str]()
+                names = map(bpy.utils.escape_identifier, bones)
+                paths |= {f'pose.bones["{name}"].{kind}' for name in names}
+            own = {bone for arm in self.shot.job.creature.bones for bone in arm}
+            self.shown.moved = {path for path in paths if bone_and_property(path)[0] in own}
+        return self.shown.moved
 
     def give_back(self, armature: bpy.types.Object) -> None:
         """Let the armature be as it was before anything was shown."""
-        show_values(armature, self.before)
-        self.before.clear()
+        show_values(armature, self.shown.before)
+        self.shown.before.clear()
 
     def steps(self) -> Iterator[float]:
         """Work all of it out, yielding the share that is done.
@@ -188,5 +201,5 @@ class Following:
 
     def write(self) -> None:
         """Give the armature its motion; that the one before is not edited is known."""
-        self.before.clear()
+        self.shown.before.clear()
         self.shot.write(unedited=True)
