@@ -9,7 +9,8 @@ Any other action is left exactly as it is.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from operator import itemgetter
 from typing import Any, Final
@@ -27,6 +28,7 @@ from ...core.keyframes import (
 )
 from ...core.phrases import phrase
 from ...core.rotations import IDENTITY, Floats, from_matrix, from_mode_values
+from ...core.steps import finished
 from ..rig import ALIGNED, armature_data, pose_of
 
 MARK: Final = "octo_motion_generated"
@@ -44,6 +46,13 @@ rounds them anew."""
 _TRAVELS: Final = 1e-4
 """Difference between the first and last value of a place from which on a loop leads elsewhere."""
 
+_BEING_WRITTEN: Final = ""
+"""Fingerprint of an action while it gets its keys."""
+CHANNELS_AT_ONCE: Final = 12
+"""How many get their keys at one step, while Blender goes on: with 700 frames that is a millisecond
+or two."""
+_CURVES_AT_ONCE: Final = 100
+"""How many are read at one step to see whether they have been edited."""
 _LEAST_SPACING: Final = 0.01
 """Blender takes keys that are no further apart, in frames, for one and the same."""
 
@@ -151,6 +160,7 @@ def write_action(
     replaceable: bool = False,
     automatic: bool = False,
     beneath: bool = False,
+    filled: HalfWritten | None = None,
 ) -> bpy.types.Action:
     """Give an object an action with these channels: their own keys, or one key per frame.
 
@@ -170,6 +180,7 @@ def write_action(
         replaceable: whether :func:`may_replace` has just said yes of ``previous``.
         automatic: whether keys on every frame have automatic handles, and lead straight on if not.
         beneath: whether the object goes on with the action that it has, which lies over this one.
+        filled: what was written of the previous one already.
 
     Returns:
         The action, assigned to the object together with its slot.
@@ -182,7 +193,8 @@ def write_action(
     # Actions made here have one layer, one strip and one slot; with more, they count as edited.
     (slot,) = action.slots
     channelbag = own_channelbag(action, slot)
-    digests, handles = _write_curves(channelbag, times, channels, automatic=automatic)
+    known = filled.digests if filled is not None and filled.name == action.name else {}
+    digests, handles = _write_curves(channelbag, times, channels, known, automatic=automatic)
     _repeat(channelbag, repeats=repeats)
     action.use_cyclic = repeats
     action.use_frame_range = True
@@ -271,7 +283,7 @@ def _mark(
         "owner": obj.name,
         "name": action.name,
         "version": _MARK_VERSION,
-        "fingerprint": _fingerprint(action, digests),
+        "fingerprint": deque(_fingerprint(action, digests), maxlen=1).pop(),
         "note": settings_note,
         "keys": key_count(action),
         "curves": sum(len(each.fcurves) for each in channelbags_of(action)),
@@ -292,10 +304,21 @@ def is_edited(action: bpy.types.Action) -> bool:
     Keys, handles, modifiers and further curves count, so do a muted or locked curve, markers and
     the frame range. A name, a colour, a selection and a fake user do not.
     """
-    mark = action.get(MARK)
+    return finished(looking_whether_edited(action))
+
+
+def looking_whether_edited(action: bpy.types.Action) -> Generator[float, None, bool]:
+    """The same in steps; an action that is gone meanwhile counts as edited."""
+    mark, name = action.get(MARK), action.name
     if mark is None or mark.get("version") != _MARK_VERSION:
         return True
-    return mark.get("fingerprint") != _fingerprint(action) or _handles_moved(action)
+    if (fingerprint := mark.get("fingerprint")) == _BEING_WRITTEN:
+        return False
+    now = ""
+    for now in _fingerprint(action):
+        yield 0.5
+    found = bpy.data.actions.get(name)
+    return found is None or fingerprint != now or _handles_moved(found)
 
 
 def note_of(action: bpy.types.Action) -> str:
@@ -339,13 +362,16 @@ def key_count(action: bpy.types.Action) -> int:
 
 def may_replace(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
     """Whether this action is the object's alone, and all that is in it was generated."""
+    return belongs_to(action, obj) and not is_edited(action)
+
+
+def belongs_to(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
+    """Whether this action was generated and is the object's alone; it may have been edited."""
     if action.library is not None or action.override_library is not None:
         return False
     if not is_generated(action) or action.asset_data is not None:
         return False
-    if not _made_for(action, obj) or _used_elsewhere(action, obj):
-        return False
-    return not is_edited(action)
+    return _made_for(action, obj) and not _used_elsewhere(action, obj)
 
 
 def _made_for(action: bpy.types.Action, obj: bpy.types.Object) -> bool:
@@ -423,11 +449,13 @@ def _write_curves(
     channelbag: bpy.types.ActionChannelbag,
     times: np.ndarray,
     channels: Sequence[Channel],
+    filled: Mapping[tuple[str, int], bytes],
     *,
     automatic: bool,
 ) -> tuple[dict[tuple[str, int], bytes], dict[tuple[str, int], np.ndarray]]:
     """Make the curves what the channels say. Curves that are there already are filled anew, so
-    that their colours, selection and place in the editors stay.
+    that their colours, selection and place in the editors stay; of those that were filled with keys
+    on all frames already the hashes are known.
 
     Returns:
         The hash of each curve's keys, by its data path and index: to read them back takes longer
@@ -437,18 +465,15 @@ def _write_curves(
     handles: dict[tuple[str, int], np.ndarray] = {}
     curves = {(curve.data_path, curve.array_index): curve for curve in channelbag.fcurves}
     # Everything goes through the same few buffers: memory stays modest, however many the bones.
-    points = np.empty((len(times), 2), dtype=np.float32)
-    points[:, 0] = times
-    # Blender draws keys of this type as a tool's own, unlike those that an artist sets.
-    kinds = np.stack(
-        [_filled(len(times), "interpolation", "BEZIER" if automatic else "LINEAR")]
-        + [_filled(len(times), "type", "GENERATED")]
-        + [_filled(len(times), "handle_left_type", "AUTO")] * automatic
-    )
+    points, kinds = _dense_keys(times, automatic=automatic)
     for channel in channels:
         for component in range(channel.values.shape[1]):
             place = (channel.data_path, component)
             curve = curves.pop(place, None)
+            if curve is not None and place in filled and len(curve.keyframe_points) == len(times):
+                digests[place] = filled[place]
+                curve.update()
+                continue
             if curve is None:
                 curve = channelbag.fcurves.new(channel.data_path, index=component)
             group = curve.group
@@ -467,6 +492,83 @@ def _write_curves(
         # Its group goes with the last of its curves.
         channelbag.fcurves.remove(curve)
     return digests, handles
+
+
+def _dense_keys(times: np.ndarray, *, automatic: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Keys (keys, 2) on all frames whose values are to be filled in, and what they are, as of
+    :func:`_write_dense`.
+    """
+    points = np.empty((len(times), 2), dtype=np.float32)
+    points[:, 0] = times
+    # Blender draws keys of this type as a tool's own, unlike those that an artist sets.
+    kinds = np.stack(
+        [_filled(len(times), "interpolation", "BEZIER" if automatic else "LINEAR")]
+        + [_filled(len(times), "type", "GENERATED")]
+        + [_filled(len(times), "handle_left_type", "AUTO")] * automatic
+    )
+    return points, kinds
+
+
+class HalfWritten:
+    """A generated action that gets its keys a few curves at a time, while Blender goes on.
+
+    Nothing of that is seen: Blender looks at keys anew only once it is told of them. Until all are
+    written the action counts as one that nobody has edited, also after a step back.
+
+    Args:
+        action: one that may be replaced.
+    """
+
+    def __init__(self, action: bpy.types.Action) -> None:
+        self.name = action.name
+        self.digests: dict[tuple[str, int], bytes] = {}
+        """The hash of the keys of each curve that is filled, by its data path and index."""
+        self._before: dict[tuple[str, int], np.ndarray] = {}
+        self._fingerprint: str = action[MARK]["fingerprint"]
+        action[MARK]["fingerprint"] = _BEING_WRITTEN
+
+    def filling(
+        self, frames: Floats, channels: Sequence[Channel], *, automatic: bool
+    ) -> Iterator[None]:
+        """Fill curves that have as many keys of the same kind already, in steps; others are left as
+        they are.
+        """
+        self.digests.clear()
+        times = _checked(frames, channels)
+        points, kinds = _dense_keys(times, automatic=automatic)
+        dense = [each for each in channels if each.keys is None]
+        for start in range(0, len(dense), CHANNELS_AT_ONCE):
+            yield
+            curves = self._curves()
+            for channel in dense[start : start + CHANNELS_AT_ONCE]:
+                for component in range(channel.values.shape[1]):
+                    place = channel.data_path, component
+                    if (curve := curves.get(place)) is None or not _alike(curve, kinds):
+                        continue
+                    self._before.setdefault(place, key_points(curve))
+                    points[:, 1] = channel.values[:, component]
+                    curve.keyframe_points.foreach_set("co", points.ravel())
+                    self.digests[place] = _keys_digest(points, kinds)
+
+    def give_back(self) -> None:
+        """Let the action be as it was."""
+        action = bpy.data.actions.get(self.name)
+        if action is None or not self._before:
+            return
+        curves = self._curves()
+        for place, points in self._before.items():
+            curve = curves.get(place)
+            if curve is not None and len(curve.keyframe_points) == len(points):
+                curve.keyframe_points.foreach_set("co", points.ravel())
+                curve.update()
+        action[MARK]["fingerprint"] = self._fingerprint
+
+    def _curves(self) -> dict[tuple[str, int], bpy.types.FCurve]:
+        """All curves by data path and index; a reference does not outlive a step."""
+        action = bpy.data.actions.get(self.name)
+        if action is None:
+            return {}
+        return {(each.data_path, each.array_index): each for each in curves_of(action)}
 
 
 def group_named(channelbag: bpy.types.ActionChannelbag, name: str) -> bpy.types.ActionGroup:
@@ -501,11 +603,8 @@ def _write_dense(curve: bpy.types.FCurve, points: np.ndarray, kinds: np.ndarray)
         kinds: (2 or 3, keys) interpolation, type, and the handles' type if they are automatic.
     """
     keys, automatic = curve.keyframe_points, len(kinds) > 2
-    interpolation, handles_are = _kind_of(keys)
-    as_many = len(keys) == len(points)
-    alike = as_many and interpolation == ("BEZIER" if automatic else "LINEAR")
-    alike = alike and (handles_are == "AUTO" or not automatic)
-    if not as_many:
+    alike = _alike(curve, kinds)
+    if len(keys) != len(points):
         keys.clear()
         keys.add(len(points))
     keys.foreach_set("co", points.ravel())
@@ -520,6 +619,20 @@ def _write_dense(curve: bpy.types.FCurve, points: np.ndarray, kinds: np.ndarray)
         curve.auto_smoothing = "NONE"
     curve.update()
     return _keys_digest(points, kinds)
+
+
+def _alike(curve: bpy.types.FCurve, kinds: np.ndarray) -> bool:
+    """Whether a curve, all of whose keys are of one kind, has as many as there are to be (kinds,
+    keys), and of that kind.
+    """
+    automatic = len(kinds) > 2
+    interpolation, handles_are = _kind_of(curve.keyframe_points)
+    alike = interpolation == ("BEZIER" if automatic else "LINEAR")
+    return (
+        len(curve.keyframe_points) == kinds.shape[1]
+        and alike
+        and (handles_are == "AUTO" or not automatic)
+    )
 
 
 def _write_bezier(
@@ -618,8 +731,9 @@ def enum_value(name: str, item: str) -> int:
 
 def _fingerprint(
     action: bpy.types.Action, known: Mapping[tuple[str, int], bytes] | None = None
-) -> str:
-    """A hash of all in an action that an artist can have set on purpose.
+) -> Iterator[str]:
+    """A hash of all in an action that an artist can have set on purpose, the last of what comes
+    after each of some steps; no hash of one that is another one meanwhile.
 
     Handles of linear keys are left out: they have no effect, and a key that is made Bézier changes
     its interpolation. Of automatic ones their being so counts: one that is moved is so no more.
@@ -639,20 +753,28 @@ def _fingerprint(
     add([(marker.name, marker.frame) for marker in action.pose_markers])
     add([slot.handle for slot in action.slots])
     add([len(layer.strips) for layer in action.layers])
-    buffer = np.empty((0, 2), dtype=np.float32)
-    for path, index, state, curve in _listed(action):
+    listed, name = _listed(action), action.name
+    buffer, count = np.empty((0, 2), dtype=np.float32), len(listed)
+    for number in range(count):
+        if known is None and number % _CURVES_AT_ONCE == _CURVES_AT_ONCE - 1:
+            yield ""
+            # No reference to a curve outlives a step.
+            again = bpy.data.actions.get(name)
+            listed = _listed(again) if again is not None else []
+            if len(listed) != count:
+                return
+        path, index, state, curve = listed[number]
         keys = curve.keyframe_points
-        count = len(keys)
         modifiers = f"{len(curve.modifiers)}{_modifier_settings(curve)}"
-        digest.update(f"({path!r}, {index}, {state}({count}, {modifiers})".encode())
+        digest.update(f"({path!r}, {index}, {state}({len(keys)}, {modifiers})".encode())
         if known is not None:
             digest.update(known[path, index])
             continue
-        if len(buffer) != count:
-            buffer = np.empty((count, 2), dtype=np.float32)
+        if len(buffer) != len(keys):
+            buffer = np.empty((len(keys), 2), dtype=np.float32)
         keys.foreach_get("co", buffer.ravel())
         digest.update(_keys_digest(buffer, _kinds(keys)))
-    return digest.hexdigest()
+    yield digest.hexdigest()
 
 
 def is_setting(path: str) -> bool:

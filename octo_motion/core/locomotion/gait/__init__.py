@@ -2,7 +2,16 @@
 """The free arm: gait table → pseudo-targets → weighted CCD."""
 
 from .ccd import close_group, diameters, shares_before
-from .gait_poser import Arm, Build, GaitPoser, GaitSettings, bone_twists, target_places
+from .gait_poser import (
+    Arm,
+    Build,
+    GaitPoser,
+    GaitSettings,
+    RoughGaitPoser,
+    bone_twists,
+    roughly,
+    target_places,
+)
 from .table import (
     ANGLES,
     CYCLE,
@@ -28,6 +37,7 @@ __all__ = [
     "GaitPoser",
     "GaitSettings",
     "GaitTable",
+    "RoughGaitPoser",
     "bone_twists",
     "check_gait",
     "close_group",
@@ -36,6 +46,7 @@ __all__ = [
     "gait_presets",
     "gait_to_json",
     "renamed_gait",
+    "roughly",
     "shares_before",
     "target_places",
 ]

@@ -307,19 +307,12 @@ class GaitPoser:
     """(arms, 4) from an arm's own frame, x outward and z up, to the body's."""
     rests: Final[tuple[ArmRest, ...]]
     """Each arm at rest."""
-    rough: bool
+    rough = False
     """Whether arms that hold the ground are soon found, and may be a little off."""
 
     def __init__(
-        self,
-        skeleton: Skeleton,
-        arms: Sequence[Arm],
-        body: BodyFrame,
-        settings: GaitSettings,
-        *,
-        rough: bool = False,
+        self, skeleton: Skeleton, arms: Sequence[Arm], body: BodyFrame, settings: GaitSettings
     ) -> None:
-        self.rough = rough
         if not arms:
             raise RigError("The list of arms is empty.", "Detect the arms, or add one.")
         self.arms = tuple(arms)
@@ -368,12 +361,6 @@ class GaitPoser:
             floor = float(np.quantile(self._whole_cycle()[0], _STANDING))
             if floor < -_LEAST_DEPTH * self.arm_length:
                 self._floor = floor
-
-    def roughly(self) -> GaitPoser:
-        """The same, but rough."""
-        result = copy(self)
-        result.rough = True
-        return result
 
     @property
     def bones(self) -> tuple[str, ...]:
@@ -592,6 +579,19 @@ class GaitPoser:
         ends = joints[np.cumsum(build.chain.sizes) - 1]
         missed = _missed(build, ends, _batch_last(asked[1], frames * arms), self.settings)
         return directions, np.moveaxis(missed.reshape(GROUPS, frames, arms), 0, -1)
+
+
+class RoughGaitPoser(GaitPoser):
+    """One that is soon made."""
+
+    rough = True
+
+
+def roughly(poser: GaitPoser) -> GaitPoser:
+    """The same, but rough."""
+    result = copy(poser)
+    result.rough = True
+    return result
 
 
 def _missed(build: Build, ends: Floats, targets: Floats, settings: GaitSettings) -> Floats:

@@ -17,7 +17,7 @@ from ...phrases import phrase
 from ...rotations import Floats, multiply, normalized, rotate
 from ...skeleton import Skeleton
 from ..body import BodyTrack, Holds, SelfMotion, Stalking, Surge, self_motion, steps_of, surge
-from ..gait import CYCLE, Arm, GaitPoser, target_places
+from ..gait import CYCLE, Arm, GaitPoser, RoughGaitPoser, roughly, target_places
 from ..ground import (
     Carpet,
     ContactOverride,
@@ -507,11 +507,10 @@ def _poser(job: MotionJob, gait: GaitJob, lean: float, *, rough: bool = False) -
     if not rough:
         return _posers.get(exact, lambda: GaitPoser(*moved))
 
-    def roughly() -> GaitPoser:
-        known = _posers.known(exact)
-        return GaitPoser(*moved, rough=True) if known is None else known.roughly()
-
-    return _posers.get(exact + b"roughly", roughly)
+    known = _posers.known(exact)
+    return _posers.get(
+        exact + b"roughly", lambda: roughly(known) if known else RoughGaitPoser(*moved)
+    )
 
 
 def _travel(job: MotionJob, gait: GaitJob, lean: float) -> TravelSettings:

@@ -23,7 +23,7 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from ....blender.animation import is_edited, may_replace
+from ....blender.animation import belongs_to, is_edited
 from ....blender.rig import active_armature, deformed_meshes, read_skeleton
 from ....core.content_cache import clear_caches, content_key
 from ....core.errors import OctoMotionError, RigError
@@ -172,6 +172,8 @@ class _Work:
     job: Job
     lines: Lines = field(default_factory=list)
     """Where it leads, to be drawn until it is there."""
+    known: bool = False
+    """Whether it is worked out, and on its way to the action."""
 
 
 @dataclass
@@ -223,6 +225,8 @@ def listen_no_more() -> None:
     """Listen no more, and drop what was about to be made."""
     while _drawing:
         bpy.types.SpaceView3D.draw_handler_remove(_drawing.pop(), "WINDOW")
+    for name in list(_state.following):
+        _let_go(_armature(name), name)
     _drop()
     _state.clear()
     clear_caches()
@@ -506,6 +510,10 @@ def _before_saving(*_: object) -> None:
     """What is saved belongs together, route and motion."""
     if not (_state.busy or _others_at_work()):
         finish_following()
+    for work in _state.following.values():
+        if work.known and work.motion is not None:
+            work.motion.take_back()
+            work.job, work.known = Job(iter(())), False
 
 
 @persistent
@@ -649,10 +657,30 @@ def _go_on(name: str, seconds: float) -> None:
                 motion.tell(armature)
             work.lines = motion.lines()
             _note_sketch(armature, motion)
-        if not there:
-            return
-        with _deaf():
-            _write(armature, settings, work.motion)
+        if there and _is_written(armature, settings, work):
+            with _deaf():
+                _write(armature, settings, motion)
+
+
+def _is_written(
+    armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion, work: _Work
+) -> bool:
+    """Whether all is there of a motion but what has to be written at once; if not, the action gets
+    what is to come before that, unless it is an artist's.
+    """
+    motion = work.motion
+    if motion is None or work.known:
+        return True
+    if kept := _whose(armature, settings, edited=motion.edited):
+        settings.live = False
+        settings.live_error = translated(kept)
+        _state.seen.pop(armature.name, None)
+        _let_go(armature)
+        return False
+    # While it plays, frames are shown as the action has them.
+    work.known = True
+    work.job = Job(iter(()) if _plays() else motion.filling(armature))
+    return False
 
 
 def _write(
@@ -663,12 +691,6 @@ def _write(
     """Write a motion that was worked out; where Generate makes other keys of it, these follow."""
     if motion is None:
         del _state.following[armature.name]
-        return
-    if kept := _whose(armature, settings):
-        settings.live = False
-        settings.live_error = translated(kept)
-        _state.seen.pop(armature.name, None)
-        _let_go(armature)
         return
     if motion.shot.detection is not None:
         # What was found is what is set from now on.
@@ -707,14 +729,24 @@ def _generated(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) 
     return playing is None or playing == previous_action(armature, settings)
 
 
-def _whose(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> str:
-    """Why the armature's action must be left alone, "" if it is ours."""
+def _whose(
+    armature: bpy.types.Object,
+    settings: OCTO_MOTION_PG_locomotion,
+    *,
+    edited: bool | None = None,
+) -> str:
+    """Why the armature's action must be left alone, "" if it is ours; whether somebody has edited
+    it may be known already.
+    """
     previous, playing = previous_action(armature, settings), playing_action(armature)
     if playing is not None and playing != previous:
         return phrase("Live is off: '{playing}' is not what was generated.", playing=playing.name)
-    if previous is None or may_replace(previous, armature):
+    if previous is None:
         return ""
-    if is_edited(previous):
+    edited = is_edited(previous) if edited is None else edited
+    if not edited and belongs_to(previous, armature):
+        return ""
+    if edited:
         return phrase("Live is off: '{previous}' was edited and is yours.", previous=previous.name)
     return phrase("Live is off: '{previous}' has other users too.", previous=previous.name)
 

@@ -12,8 +12,10 @@ import numpy as np
 
 from ....blender.animation import (
     LENGTH,
+    HalfWritten,
     PropertyValues,
     animated_bones,
+    looking_whether_edited,
     show_values,
     shown_values,
 )
@@ -49,6 +51,8 @@ class Shown:
     """Values by path."""
     moved: set[str] | None = None
     """Paths of scales and locations of arms' bones that its action moves, once they are known."""
+    half: HalfWritten | None = None
+    """Its action, while it gets its keys."""
 
 
 class Following:
@@ -84,6 +88,8 @@ class Following:
         self.sketch = sketch if sketch is not None and sketch.may_show(self.shot.job) else None
         """What it is drawn from; none where all that is shown of it is as it will be."""
         self._plan: MotionPlan | None = None if self.sketch is not None else self.shot.plan()
+        self.edited = False
+        """Whether somebody has edited the motion before."""
         self._few = locomotion_settings(armature).keys == "REDUCED"
         self._frame: float | None = None
         """The one in sight, none while nothing is shown."""
@@ -157,8 +163,15 @@ class Following:
             self.shown.moved = {path for path in paths if bone_and_property(path)[0] in own}
         return self.shown.moved
 
+    def take_back(self) -> None:
+        """Let the action be as it was, if that has got any keys already."""
+        if self.shown.half is not None:
+            self.shown.half.give_back()
+            self.shown.half = None
+
     def give_back(self, armature: bpy.types.Object) -> None:
         """Let the armature be as it was before anything was shown."""
+        self.take_back()
         show_values(armature, self.shown.before)
         self.shown.before.clear()
 
@@ -179,6 +192,15 @@ class Following:
         result = yield from pose(self._plan, brief=True)
         yield from self._sketched(result.known)
         self.shot.result = result
+        yield 1.0
+        self.shot.quarters = self.shot.passed_quarters(result)
+        yield 1.0
+        armature = bpy.data.objects.get((self.shot.armature, None))
+        previous = None
+        if armature is not None:
+            previous = previous_action(armature, locomotion_settings(armature))
+        if previous is not None:
+            self.edited = yield from looking_whether_edited(previous)
 
     def _sketched(self, known: KnownMotion) -> Iterator[float]:
         """Let the next change be drawn from what is known now."""
@@ -199,7 +221,18 @@ class Following:
         if frame == self._frame:
             self._give(armature, values)
 
+    def filling(self, armature: bpy.types.Object) -> Iterator[float]:
+        """Write most of it, in steps, that nobody has edited the motion before being known."""
+        made, previous = self.shot.result, previous_action(armature, locomotion_settings(armature))
+        assert made is not None
+        if previous is None:
+            return
+        half = self.shown.half = self.shown.half or HalfWritten(previous)
+        for _ in half.filling(made.frames, made.channels, automatic=made.automatic):
+            yield 1.0
+
     def write(self) -> None:
         """Give the armature its motion; that the one before is not edited is known."""
         self.shown.before.clear()
-        self.shot.write(unedited=True)
+        self.shot.write(unedited=True, filled=self.shown.half)
+        self.shown.half = None

@@ -13,6 +13,7 @@ import numpy as np
 
 from ....blender.animation import (
     CYCLES,
+    HalfWritten,
     curves_of,
     edit_layer,
     follow,
@@ -189,6 +190,8 @@ class Shot:
     """What :meth:`write` has made …"""
     told: tuple[str, ...] = ()
     """… and what there is to know of the poses that it found."""
+    quarters: list[float] | None = None
+    """What :meth:`passed_quarters` says of it, if that is known already."""
     seed: int | None = None
     """The seed that it was made with, if its settings may have another."""
 
@@ -206,10 +209,11 @@ class Shot:
         """
         return finished(plan_motion(self.job))
 
-    def write(self, *, unedited: bool = False) -> Summary:
+    def write(self, *, unedited: bool = False, filled: HalfWritten | None = None) -> Summary:
         """Give the armature its action, in place of the one that was generated before.
 
-        Unedited, it is known already that the one before may be made anew.
+        Unedited, it is known already that the one before may be made anew, and what is filled of it
+        already is written.
 
         Raises:
             WriteError: the object is gone, or has become read-only.
@@ -223,7 +227,7 @@ class Shot:
             )
         writable_armature(armature)
         settings = locomotion_settings(armature)
-        action = self._write_action(armature, settings, made, unedited=unedited)
+        action = self._write_action(armature, settings, made, unedited=unedited, filled=filled)
         if self.seed is not None:
             assign(settings, "seed", self.seed)
         if self.detection is not None:
@@ -316,6 +320,7 @@ class Shot:
         made: MotionResult,
         *,
         unedited: bool,
+        filled: HalfWritten | None,
     ) -> bpy.types.Action:
         """Write the keys, and lay to rest what the action before moved and this one does not."""
         previous = previous_action(armature, settings)
@@ -350,12 +355,13 @@ class Shot:
                 replaceable=unedited,
                 automatic=made.automatic,
                 beneath=layer is not None,
+                filled=filled,
             )
         except WriteError:
             settings.result = previous
             raise
         settings.result = action
-        action[CYCLES] = self._quarters(made)
+        action[CYCLES] = self.quarters or self.passed_quarters(made)
         if layer is not None:
             assert previous is not None
             follow(armature, layer, (previous, action), cycles)
@@ -363,7 +369,7 @@ class Shot:
         return action
 
     @staticmethod
-    def _quarters(made: MotionResult) -> list[float]:
+    def passed_quarters(made: MotionResult) -> list[float]:
         """Frames at which the gait passes quarters of its cycles."""
         when, standing = made.plan.schedule, made.plan.first.standing
         bearings = standing.bearings if standing is not None else None
