@@ -315,7 +315,8 @@ def looking_whether_edited(action: bpy.types.Action) -> Generator[float, None, b
     if (fingerprint := mark.get("fingerprint")) == _BEING_WRITTEN:
         return False
     now = ""
-    for now in _fingerprint(action):
+    for text in _fingerprint(action):
+        now = text
         yield 0.5
     found = bpy.data.actions.get(name)
     return found is None or fingerprint != now or _handles_moved(found)

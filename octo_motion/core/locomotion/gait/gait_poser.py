@@ -582,9 +582,18 @@ class GaitPoser:
 
 
 class RoughGaitPoser(GaitPoser):
-    """One that is soon made."""
+    """One that is soon made: its cycle is looked at once, and what would reach below the floor is
+    taken to lie on it.
+    """
 
     rough = True
+    _looked: tuple[Floats, dict[int, Floats]] | None = None
+
+    def _whole_cycle(self) -> tuple[Floats, dict[int, Floats]]:
+        if self._looked is None:
+            self._looked = super()._whole_cycle()
+        depths, middles = self._looked
+        return np.maximum(depths, self._floor), middles
 
 
 def roughly(poser: GaitPoser) -> GaitPoser:

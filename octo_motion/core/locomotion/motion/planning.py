@@ -17,7 +17,15 @@ from ...phrases import phrase
 from ...rotations import Floats, multiply, normalized, rotate
 from ...skeleton import Skeleton
 from ..body import BodyTrack, Holds, SelfMotion, Stalking, Surge, self_motion, steps_of, surge
-from ..gait import CYCLE, Arm, GaitPoser, RoughGaitPoser, roughly, target_places
+from ..gait import (
+    CYCLE,
+    Arm,
+    GaitPoser,
+    GaitSettings,
+    RoughGaitPoser,
+    roughly,
+    target_places,
+)
 from ..ground import (
     Carpet,
     ContactOverride,
@@ -372,12 +380,13 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
 
 
 def plan_near(
-    job: MotionJob, known: MotionPlan, first: float, last: float
+    job: MotionJob, known: MotionPlan, first: float, last: float, *, anew: bool = False
 ) -> Generator[float, None, tuple[MotionPlan, slice]]:
     """A rough plan for a motion from one frame to another, in steps, from that of a motion that is
     nearly the same; with it come the numbers of the moments there.
 
     Both have one gait all the way. What has little to do with where the arms are is taken over.
+    What moves the arms is made anew if it is not known, or in any case.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
@@ -388,7 +397,7 @@ def plan_near(
     if before is not None:
         distance = distances_at(when.route, when.travel, plan.moments[1][moments])
         near = Nearby(before, float(distance[0]), float(distance[-1]))
-    poser = _poser(job, gait, when.lean, rough=True)
+    poser = _rough_poser(job, when.lean, anew=anew)
     yield 0.3
     moving = _gait(job, gait, poser, when.route, lean=when.lean, plane=None, near=near)
     yield 0.7
@@ -497,20 +506,26 @@ def reach_of(creature: Creature) -> float:
     return float(np.array(lengths).mean()) * creature.scale
 
 
-def _poser(job: MotionJob, gait: GaitJob, lean: float, *, rough: bool = False) -> GaitPoser:
-    """What moves the arms in a gait, roughly or not, the same as before while nothing of it has
-    changed.
-    """
-    settings = replace(gait.settings, swim_lean=0.0 if gait.settings.gait.on_ground else lean)
-    moved = job.creature.skeleton, job.creature.arms, job.creature.body, settings
-    exact = content_key(*moved)
-    if not rough:
-        return _posers.get(exact, lambda: GaitPoser(*moved))
+def _poser(job: MotionJob, gait: GaitJob, lean: float) -> GaitPoser:
+    """What moves the arms in a gait, the same as before while nothing of it has changed."""
+    moved = _moved_by(job, gait, lean)
+    return _posers.get(content_key(*moved), lambda: GaitPoser(*moved))
 
-    known = _posers.known(exact)
-    return _posers.get(
-        exact + b"roughly", lambda: roughly(known) if known else RoughGaitPoser(*moved)
-    )
+
+def _rough_poser(job: MotionJob, lean: float, *, anew: bool) -> GaitPoser:
+    """What moves the arms roughly in a motion's gait: the same as before, or soon made anew."""
+    moved = _moved_by(job, job.gaits[0], lean)
+    key = content_key(*moved)
+    if (known := _posers.known(key)) is not None and not anew:
+        return roughly(known)
+    return _posers.get(key + b"rough", lambda: RoughGaitPoser(*moved))
+
+
+def _moved_by(
+    job: MotionJob, gait: GaitJob, lean: float
+) -> tuple[Skeleton, tuple[Arm, ...], BodyFrame, GaitSettings]:
+    settings = replace(gait.settings, swim_lean=0.0 if gait.settings.gait.on_ground else lean)
+    return job.creature.skeleton, job.creature.arms, job.creature.body, settings
 
 
 def _travel(job: MotionJob, gait: GaitJob, lean: float) -> TravelSettings:

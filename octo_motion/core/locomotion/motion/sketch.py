@@ -20,6 +20,7 @@ from ...content_cache import content_key
 from ...rotations import Floats, conjugate, multiply, slerp
 from ...steps import finished
 from ..body import OrganPoses
+from ..gait import RoughGaitPoser
 from ..path import distances_at
 from ..rig import ArmMotion
 from .job import MotionJob
@@ -74,7 +75,8 @@ class Sketch:
 
     def __init__(self, known: KnownMotion) -> None:
         self._known = known
-        self._made: _Made | None = None
+        self._made: dict[bool, _Made] = {}
+        """By whether what moves the arms is made anew."""
         self._organs: tuple[float, OrganPoses] | None = None
         self._body = _body_key(known.plan.job)
         when = known.plan.schedule
@@ -105,7 +107,8 @@ class Sketch:
 
     def preparing(self, frame: float) -> Generator[float, None, None]:
         """Work out beforehand, in steps, what will be asked for near a frame."""
-        yield from self._making(self._known.plan.moment_of(frame))
+        for anew in (False, True):
+            yield from self._making(self._known.plan.moment_of(frame), anew=anew)
 
     def at(self, job: MotionJob, frame: float) -> list[Glimpsed]:
         """What a motion is nearly at a frame: the values of all channels.
@@ -119,7 +122,7 @@ class Sketch:
         come = float(body.travel.distance[0]) / plan.schedule.travel.stride
         moments = np.arange(len(self._strides), dtype=np.float64)
         near = round(float(np.interp(come, self._strides, moments)))
-        made = self._made_around(near)
+        made = self._made_around(near, anew=isinstance(plan.first.poser, RoughGaitPoser))
         arms = self._with_what_is_made(made, arms, plan, body)
         beside = made.shifts[min(max(near - made.first, 0), len(made.shifts) - 1)]
         body = replace(body, keyed=(body.keyed[0] + beside, body.keyed[1]))
@@ -148,28 +151,29 @@ class Sketch:
         places = places + moved
         return places[: len(centres)], places[len(centres) :]
 
-    def _made_around(self, number: int) -> _Made:
+    def _made_around(self, number: int, *, anew: bool) -> _Made:
         """What is made of arms around one of the moments."""
-        finished(self._making(number))
-        assert self._made is not None
-        return self._made
+        finished(self._making(number, anew=anew))
+        return self._made[anew]
 
-    def _making(self, number: int) -> Generator[float, None, None]:
+    def _making(self, number: int, *, anew: bool) -> Generator[float, None, None]:
         known, plan = self._known, self._known.plan
         begin, end = known.first, known.first + len(known.arms.rotations)
         number = min(max(number, begin), end - 1)
-        if self._made is not None and self._made.has(number):
+        if anew in self._made and self._made[anew].has(number):
             return
         first, last = max(number - _WINDOW, begin), min(number + _WINDOW + 1, end)
         frames, times = plan.moments
         there = body_at(plan, times[first:last])
         yield 0.1
-        plan, part = yield from plan_near(plan.job, plan, frames[first], frames[last - 1])
+        plan, part = yield from plan_near(
+            plan.job, plan, frames[first], frames[last - 1], anew=anew
+        )
         body = body_at(plan, plan.moments[1][part])
         yield 0.5
         bare = yield from plan.segments.posing_by_themselves(body.travel, body.places)
         whole = known.arms.at(slice(first - begin, last - begin))
-        self._made = _Made(
+        self._made[anew] = _Made(
             first,
             (begin, end),
             _phases(plan, body),

@@ -13,7 +13,7 @@ nothing is live, Blender is not kept waiting: thousands of objects may move with
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from itertools import count
@@ -42,7 +42,7 @@ from ..settings import (
     once_called,
     read_overrides,
 )
-from ..writing import RESULTS, Following, Shot, Summary, make, prepare
+from ..writing import RESULTS, Before, Following, Shot, Summary, make, prepare
 
 PATIENCE: Final = 1.5
 """Seconds that the window may stand still; a longer job shows its progress and can be stopped."""
@@ -185,7 +185,12 @@ class _State:
     changed: dict[str, bool] = field(default_factory=dict)
     """Armatures to look at, and whether it is known already that they changed."""
     known: dict[str, Shot] = field(default_factory=dict)
-    """What was read of armatures of which at most the route has changed since."""
+    """What was read of armatures …"""
+    rigs: dict[str, str] = field(default_factory=dict)
+    """… when this was so of their rigs …"""
+    touched: dict[str, set[str]] = field(default_factory=dict)
+    """… and what of it may have changed since: "RIG", "GROUND" or "ELSE", which is not the route.
+    """
     following: dict[str, _Work] = field(default_factory=dict)
     """Motions of which no more than the frame in sight is there, by the armature's name."""
     sketches: dict[str, Sketch] = field(default_factory=dict)
@@ -333,9 +338,9 @@ def _after_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
             or not touched.isdisjoint(_sources(armature))
             or _is_skin(armature, meshes)
         ):
-            _soon(name, certain=True, route_alone=touched <= _route_of(armature))
+            _soon(name, certain=True, touched=_changed(armature, touched, meshes))
         elif marked & {name, once_called(locomotion_settings(armature).ground)} - {""}:
-            _soon(name, certain=False)
+            _soon(name, certain=False, touched={"ELSE"})
 
 
 @persistent
@@ -433,7 +438,8 @@ def _look_at(armature: bpy.types.Object) -> None:
         for known in (_state.seen, _state.changed):
             known.pop(name, None)
     elif name in _state.seen:
-        _soon(name, certain=False)
+        # What of its rig has changed is looked at itself.
+        _soon(name, certain=False, touched={"ELSE"})
     else:
         _state.seen[name] = None
         _soon(name, certain=True)
@@ -463,16 +469,23 @@ def _sources(armature: bpy.types.Object) -> set[bpy.types.ID]:
         # What is carried gets keys from us.
         *(each.target for each in settings.reaches if not each.carry),
     ]
-    found: set[bpy.types.ID] = set()
-    for root in roots:
-        each = root
-        while each is not None and each != armature:
-            found.add(each)
-            if each.data is not None:
-                found.add(each.data)
-            each = each.parent
+    found: set[bpy.types.ID] = set().union(*(_with_parents(root, armature) for root in roots))
     # Blender tags the armature's data with every pose: its bones are looked at themselves.
     return found | ({settings.weight_curve} - {None})
+
+
+def _with_parents(
+    root: bpy.types.Object | None, until: bpy.types.Object | None = None
+) -> set[bpy.types.ID]:
+    """An object, those that carry it up to another one, and their data."""
+    found: set[bpy.types.ID] = set()
+    each = root
+    while each is not None and each != until:
+        found.add(each)
+        if each.data is not None:
+            found.add(each.data)
+        each = each.parent
+    return found
 
 
 def _route_of(armature: bpy.types.Object) -> set[bpy.types.ID]:
@@ -480,6 +493,22 @@ def _route_of(armature: bpy.types.Object) -> set[bpy.types.ID]:
     settings = locomotion_settings(armature)
     route, own = settings.route, {settings.ground.object, settings.body.look_at, armature.parent}
     return {route, route.data} - own if route is not None and route not in own else set()
+
+
+def _changed(
+    armature: bpy.types.Object, touched: set[bpy.types.ID], meshes: set[bpy.types.Mesh]
+) -> set[str]:
+    """What of a motion these are that have changed, besides its route."""
+    ground = locomotion_settings(armature).ground.object
+    its = _with_parents(ground) if ground is not None else set[bpy.types.ID]()
+    found = {"GROUND"} if touched & its else set[str]()
+    if _is_skin(armature, meshes):
+        found.add("RIG")
+    if touched & (_sources(armature) - its - _route_of(armature)) or not touched & _route_of(
+        armature
+    ):
+        found.add("ELSE")
+    return found
 
 
 def _is_skin(armature: bpy.types.Object, meshes: set[bpy.types.Mesh]) -> bool:
@@ -540,16 +569,20 @@ def _live_armatures() -> list[bpy.types.Object]:
 # --- The motion ----------------------------------------------------------------------------------
 
 
-def _soon(name: str, *, certain: bool, wait: float = _SOON, route_alone: bool = False) -> None:
-    if not route_alone:
-        _state.known.pop(name, None)
+_ANYTHING: Final = frozenset({"RIG", "GROUND", "ELSE"})
+
+
+def _soon(
+    name: str, *, certain: bool, wait: float = _SOON, touched: Collection[str] = _ANYTHING
+) -> None:
+    _state.touched.setdefault(name, set()).update(touched)
     _state.changed[name] = certain or _state.changed.get(name, False)
     if not pending():
         bpy.app.timers.register(run_pending, first_interval=wait)
 
 
 def _drop() -> None:
-    for known in (_state.changed, _state.known, _state.following):
+    for known in (_state.changed, _state.known, _state.touched, _state.following):
         known.clear()
     _stop(run_pending)
     _stop(run_following)
@@ -597,11 +630,14 @@ def _follow(name: str, *, certain: bool) -> None:
     if armature.mode == "EDIT" or not _within_scene(armature):
         # Leaving edit mode is a change of its own.
         return
-    now = _made_from(armature, settings)
+    now, rig = _read_from(armature, settings)
     if _state.seen.get(name) != now:
-        _state.known.pop(name, None)
+        _state.touched.setdefault(name, set()).add("ELSE")
     elif not certain:
         return
+    if _state.rigs.get(name) != rig:
+        _state.touched.setdefault(name, set()).update(_ANYTHING)
+        _state.rigs[name] = rig
     with _telling(armature, settings), _deaf(), _window_of(armature):
         _make(armature, settings)
     if settings.live:
@@ -625,10 +661,19 @@ def _telling(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) ->
 
 def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> None:
     """Show the frame in sight, and let the others follow."""
-    earlier, known = _state.following.get(armature.name), _state.known.pop(armature.name, None)
-    before = earlier.motion if earlier is not None else None
-    motion = Following(armature, bpy.context, before, known, _state.sketches.get(armature.name))
-    _state.known[armature.name] = replace(motion.shot)
+    name, before = armature.name, None
+    earlier, known = _state.following.get(name), _state.known.pop(name, None)
+    touched = _state.touched.pop(name, set())
+    if known is not None:
+        before = Before(
+            known,
+            rig="RIG" not in touched and not settings.keep_pose,
+            ground="GROUND" not in touched,
+            all_else=not touched,
+        )
+    shown = earlier.motion if earlier is not None else None
+    motion = Following(armature, bpy.context, shown, before, _state.sketches.get(name))
+    _state.known[name] = replace(motion.shot)
     _state.following[armature.name] = _Work(motion, Job(motion.steps()), motion.lines())
     # Whose action it is that another frame shows again is looked at before it is written.
     scene = bpy.context.scene
@@ -692,7 +737,7 @@ def _write(
     if motion is None:
         del _state.following[armature.name]
         return
-    if motion.shot.detection is not None:
+    if motion.shot.rig.detection is not None:
         # What was found is what is set from now on.
         _state.known.pop(armature.name, None)
     motion.write()
@@ -753,6 +798,23 @@ def _whose(
 
 def _made_from(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> str:
     """All that a motion is made from and that belongs to the armature object itself, as text."""
+    return _read_from(armature, settings)[0]
+
+
+_OF_RIG: Final = frozenset(
+    {
+        *("arms", "root_bone", "body_up", "body_front", "keep_pose", "travel_on", "keep_apart"),
+        *("mantle_bone", "siphon_bone", "eye_left", "eye_right", "trail"),
+        *("use", "object", "stretch_as", "gait"),
+    }
+)
+"""Settings that hang on the rig and on the ground, of the motion, its body or its ground."""
+
+
+def _read_from(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> tuple[str, str]:
+    """All that a motion is made from and that belongs to the armature object itself, as text, and
+    of that what is its rig.
+    """
     wishes = [
         (place, each.removed, each.shift, each.heading, np.asarray(each.position).tolist())
         for place, each in sorted(read_overrides(settings.ground, armature).items())
@@ -766,13 +828,16 @@ def _made_from(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) 
     # Where it travels itself, its place is what the motion makes of it.
     travels = settings.travel_on == "OBJECT"
     place = armature.scale if travels else [value for row in armature.matrix_world for value in row]
-    return json.dumps(
-        [
-            *(plain(settings, without=_NO_MATTER), wishes, [*place], armature.rotation_mode),
-            *(rest, [bone.rotation_mode for bone in bones]),
-        ],
-        sort_keys=True,
-    )
+    asked = plain(settings, without=_NO_MATTER)
+    rig: list[Any] = [
+        [*place],
+        armature.rotation_mode,
+        rest,
+        [each.rotation_mode for each in bones],
+    ]
+    groups = asked, asked["body"], asked["ground"]
+    known = [{name: each[name] for name in sorted(_OF_RIG & each.keys())} for each in groups]
+    return json.dumps([asked, wishes, rig], sort_keys=True), json.dumps([known, rig])
 
 
 @contextmanager

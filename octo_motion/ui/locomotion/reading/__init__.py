@@ -16,6 +16,7 @@ from .motion import (
     tolerances_of,
 )
 from .rig import (
+    RigRead,
     add_item,
     body_axes,
     bones_of,
@@ -31,6 +32,7 @@ from .rig import (
 )
 
 __all__ = [
+    "RigRead",
     "add_item",
     "body_axes",
     "bones_of",

@@ -164,14 +164,16 @@ def read_timing(settings: OCTO_MOTION_PG_locomotion, render: bpy.types.RenderSet
     )
 
 
-def read_body(settings: OCTO_MOTION_PG_locomotion, creature: Creature) -> BodyJob:
-    """What the body does by itself, but for what it looks at.
+def read_body(
+    settings: OCTO_MOTION_PG_locomotion, creature: Creature, organs: Organs | None = None
+) -> BodyJob:
+    """What the body does by itself, but for what it looks at; its organs may be known.
 
     Raises:
         RigError: a bone that was given by hand is not there, or cannot move by itself.
     """
     body = settings.body
-    organs = find_organs(
+    organs = organs or find_organs(
         creature.skeleton,
         creature.listed or creature.bones,
         creature.body,
@@ -347,9 +349,11 @@ def read_ground(
     edits: Mapping[Place, ContactEdit],
     *,
     walks: bool,
+    same_rig: GroundJob | None = None,
+    same_mesh: GroundJob | None = None,
 ) -> GroundJob | None:
     """The ground under a walk with the artist's edits of single contacts, none where nothing holds
-    it.
+    it; of the one before what is still so, its arms or its mesh.
 
     Raises:
         GroundError: the ground is no mesh, or has no faces.
@@ -359,7 +363,7 @@ def read_ground(
         return None
     mesh, warnings = None, list[str]()
     if ground.object is not None and settings.travel_on != "NONE":
-        mesh = read_triangles(ground.object, depsgraph)
+        mesh = same_mesh.mesh if same_mesh is not None else read_triangles(ground.object, depsgraph)
         if len(ground.object.modifiers) > 0 and not is_enabled(ground.object, depsgraph):
             warnings.append(phrase(_BARE, name=ground.object.name))
     by_moving = creature.channels.moved is not None
@@ -367,7 +371,9 @@ def read_ground(
         warnings.append(phrase(_CONNECTED, armature=armature.name))
     return GroundJob(
         stance=read_settings(StanceSettings, ground),
-        skins=arm_skins(armature, creature.at_rest, creature.bones),
+        skins=same_rig.skins
+        if same_rig is not None
+        else arm_skins(armature, creature.at_rest, creature.bones),
         may_stretch=[may_stretch(armature, bones, by_moving=by_moving) for bones in creature.bones],
         mesh=mesh,
         overrides=tuple(overrides_for_core(dict(edits), creature.arms)),

@@ -35,7 +35,7 @@ from ....core.steps import finished
 from ...overlay_lines import Lines
 from ..reading import previous_action
 from ..settings import locomotion_settings
-from .shot import Shot, prepare, rerouted
+from .shot import Before, Shot, prepare_anew
 
 _PATH: Final = (1.0, 0.75, 0.2, 0.9)
 _FOOTHOLD: Final = (0.3, 0.9, 0.85, 0.9)
@@ -64,7 +64,7 @@ class Following:
         armature: that moves.
         context: with its scene.
         earlier: what was being followed, and is no more.
-        known: the shot as it was read last, if nothing but the route has changed since.
+        before: the shot as it was read last, and what of that is still so.
         sketch: of a motion that this is nearly like, if there is one.
 
     Raises:
@@ -76,14 +76,10 @@ class Following:
         armature: bpy.types.Object,
         context: bpy.types.Context,
         earlier: Following | None = None,
-        known: Shot | None = None,
+        before: Before | None = None,
         sketch: Sketch | None = None,
     ) -> None:
-        self.shot: Shot = (
-            rerouted(known, armature, context)
-            if known is not None
-            else prepare(armature, context, live=True)
-        )
+        self.shot: Shot = prepare_anew(armature, context, before)
         self.shown: Shown = earlier.shown if earlier is not None else Shown()
         self.sketch = sketch if sketch is not None and sketch.may_show(self.shot.job) else None
         """What it is drawn from; none where all that is shown of it is as it will be."""

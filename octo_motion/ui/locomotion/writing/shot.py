@@ -43,12 +43,12 @@ from ....core.locomotion.motion import (
 )
 from ....core.locomotion.path import plan_travel
 from ....core.locomotion.reaching import Carried
-from ....core.locomotion.rig import Detection
 from ....core.phrases import as_phrase, joined_phrases, phrase
 from ....core.rotations import Floats
 from ....core.steps import finished
 from ...declared_settings import assign, plain
 from ..reading import (
+    RigRead,
     bones_of,
     playing_action,
     previous_action,
@@ -177,8 +177,8 @@ class Shot:
     armature: str
     scene: str
     job: MotionJob
-    detection: Detection | None
-    """What was found, if the settings had no arms."""
+    rig: RigRead
+    """The rig as it was read; with it comes what was found, if the settings had no arms."""
     edits: dict[Place, ContactEdit]
     """What the artist wants of single contacts."""
     extend_scene_range: bool
@@ -230,10 +230,10 @@ class Shot:
         action = self._write_action(armature, settings, made, unedited=unedited, filled=filled)
         if self.seed is not None:
             assign(settings, "seed", self.seed)
-        if self.detection is not None:
+        if self.rig.detection is not None:
             # What was moved is what the list shows from now on.
-            write_arms(settings, self.detection.arms)
-            write_body(settings, self.detection)
+            write_arms(settings, self.rig.detection.arms)
+            write_body(settings, self.rig.detection)
         if made.plan.keeps_contacts:
             store(settings.ground, self.edits)
             if settings.ground.shown:
@@ -491,10 +491,37 @@ def generate_locomotion(armature: bpy.types.Object, context: bpy.types.Context) 
     return shot.summary
 
 
-def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: bool = False) -> Shot:
+@dataclass(frozen=True, eq=False)
+class Before:
+    """What was read for the motion before, and what of it Blender says is still so."""
+
+    shot: Shot
+    rig: bool = False
+    """The rig with its skin, and all settings that hang on it."""
+    ground: bool = False
+    """The ground's mesh."""
+    all_else: bool = False
+    """All but the route."""
+
+    @property
+    def ground_stays(self) -> bool:
+        """Whether the ground is as it was at any frame."""
+        ground = self.shot.job.ground
+        return self.ground and ground is not None and ground.moving is None
+
+
+# In one piece, for it is all that is read, one thing after the other.
+def prepare(
+    armature: bpy.types.Object,
+    context: bpy.types.Context,
+    *,
+    live: bool = False,
+    before: Before | None = None,
+) -> Shot:
     """Read all that the motion of an armature needs. Nothing is changed, nothing worked out.
 
-    Live, it is to be quick: the same with a key on every frame, and no figures of how good it is.
+    Live, it is to be quick: the same with a key on every frame, and no figures of how good it is;
+    what is known to be as it was before is not read again.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
@@ -507,7 +534,14 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     _check_route(settings, armature)
     _write_back(settings.route, settings.ground.object)
     depsgraph = context.evaluated_depsgraph_get()
-    found = read_creature(armature, settings, world_matrix(armature))
+    last = before.shot.job if before is not None else None
+    same_rig = last if before is not None and before.rig else None
+    same_ground = last if before is not None and before.ground_stays else None
+    found = (
+        before.shot.rig
+        if before is not None and before.rig
+        else read_creature(armature, settings, world_matrix(armature))
+    )
     creature, edits = found.creature, read_overrides(settings.ground, armature)
     changes, names = read_changes(settings.change, settings.gait, in_place=in_place)
     gaits = read_gaits(settings, names)
@@ -524,10 +558,17 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
         timing=read_timing(settings, scene.render),
         height=settings.height if settings.height_mode == "MANUAL" else None,
         streamline=settings.streamline,
-        body=read_body(settings, creature),
-        ground=read_ground(settings, armature, depsgraph, creature, edits, walks=walks),
+        body=read_body(settings, creature, same_rig.body.organs if same_rig else None),
+        ground=read_ground(
+            *(settings, armature, depsgraph, creature, edits),
+            walks=walks,
+            same_rig=same_rig.ground if same_rig else None,
+            same_mesh=same_ground.ground if same_ground else None,
+        ),
         floor=None if live else read_floor(settings, armature, depsgraph, creature, walks=walks),
-        volume=read_volume(settings, armature, creature, live=live),
+        volume=same_rig.volume
+        if same_rig
+        else read_volume(settings, armature, creature, live=live),
         keep_apart=settings.keep_apart,
         tell_overlaps=settings.tell_overlaps and not live,
         reaching=None,
@@ -545,30 +586,34 @@ def prepare(armature: bpy.types.Object, context: bpy.types.Context, *, live: boo
     return Shot(
         armature=armature.name,
         scene=scene.name,
-        job=_with_motion_of_ground(job, armature, settings.ground.object),
-        detection=found.detection,
+        job=job if same_ground else _with_motion_of_ground(job, armature, settings.ground.object),
+        rig=found,
         edits=edits,
         extend_scene_range=settings.extend_scene_range,
         note=json.dumps(plain(settings, without=RESULTS), sort_keys=True),
     )
 
 
-def rerouted(shot: Shot, armature: bpy.types.Object, context: bpy.types.Context) -> Shot:
-    """A shot of which nothing but the route has changed since it was read, on its route as it is.
+def prepare_anew(
+    armature: bpy.types.Object, context: bpy.types.Context, before: Before | None
+) -> Shot:
+    """The same live, of an armature that may have been read before.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
-    job, settings = shot.job, locomotion_settings(armature)
+    if before is None or not before.all_else:
+        return prepare(armature, context, live=True, before=before)
+    job, settings = before.shot.job, locomotion_settings(armature)
     read = job.reaching, job.body.look_at, job.begin, job.end
     moves = job.ground is not None and job.ground.moving is not None
     if moves or job.route is None or any(each is not None for each in read):
         # What moves meanwhile is read at the frames of the motion, and poses where they are.
-        return prepare(armature, context, live=job.live)
+        return prepare(armature, context, live=True)
     _check_route(settings, armature)
     _write_back(settings.route)
     route = read_route(settings.route, context.evaluated_depsgraph_get(), settings.spline)
-    return replace(shot, job=replace(job, route=route))
+    return replace(before.shot, job=replace(job, route=route))
 
 
 def _with_motion_of_ground(
