@@ -446,6 +446,137 @@ def as_planned(armature: Any) -> dict[str, np.ndarray]:
     return seen(armature)
 
 
+NEARLY: list[tuple[str, Any]] = [
+    ("contraction", 0.8),
+    ("heading_angle", 0.1),
+    ("turning", 0.0),
+    ("phase_spread", 0.9),
+]
+
+
+@pytest.mark.parametrize(("name", "value"), NEARLY)
+def test_a_slider_is_followed_nearly_at_once(octopus: Any, name: str, value: Any) -> None:
+    settings_of(octopus).frame_end = 160
+    bpy.context.scene.frame_set(80)
+    settings_of(octopus).ground.object = make_square(20.0)
+    settle()
+    before, here = motion(octopus), seen(octopus)
+    setattr(settings_of(octopus), name, value)
+    octopus.update_tag(refresh={"OBJECT"})
+    bpy.context.view_layer.update()
+    live.run_pending()
+    (work,) = live._state.following.values()
+    # Nothing of it is planned yet.
+    assert work.motion is not None
+    assert work.motion.sketch is not None
+    assert work.motion._plan is None
+    assert motion(octopus) == before
+    shown = seen(octopus)
+    live.finish_following()
+    there = seen(octopus)
+    far, nearly = (farthest(there, each) for each in (here, shown))
+    print("NEARLY", name, far, nearly)
+    assert nearly < 0.03
+    assert far > 2.0 * nearly
+
+
+def farthest(here: dict[str, np.ndarray], there: dict[str, np.ndarray]) -> float:
+    """By how much bones' heads are apart at most, metres."""
+    return max(np.linalg.norm(there[name][:3, 3] - here[name][:3, 3]) for name in here)
+
+
+@pytest.fixture
+def slowly(octopus: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The same with a key on every frame of a motion that has frames enough for that, which comes
+    to be written in many steps.
+    """
+    monkeypatch.setattr(actions, "CHANNELS_AT_ONCE", 2)
+    settings_of(octopus).frame_end = 400
+    settle()
+    return octopus
+
+
+def as_written(armature: Any) -> tuple[str, Any]:
+    """Go on with what is on its way until its action is about to get its first keys; what it is."""
+    live._stop(live.run_following)
+    ((name, work),) = live._state.following.items()
+    while not work.known:
+        live._go_on(name, 0.0)
+    assert live._state.following[name] is work
+    assert name == armature.name
+    return name, work
+
+
+def test_keys_come_a_few_curves_at_a_time_and_none_is_seen_before_all(slowly: Any) -> None:
+    drag_route(slowly)
+    bpy.context.view_layer.update()
+    live.run_pending()
+    as_planned(slowly)
+    name, work = as_written(slowly)
+    before, shown = motion(slowly), seen(slowly)
+    most = 4 * actions.CHANNELS_AT_ONCE
+    steps = 0
+    while live._state.following.get(name) is work and not work.job.finished:
+        last = motion(slowly)
+        live._go_on(name, 0.0)
+        if name in live._state.following:
+            now = motion(slowly)
+            assert sum(now[place] != last[place] for place in now) <= most
+            bpy.context.view_layer.update()
+            assert apart(seen(slowly), shown) < 1e-6
+            steps += 1
+    assert steps > len(before) / most
+    live.finish_following()
+    followed = motion(slowly)
+    assert followed != before
+    assert not actions.is_edited(action_of(slowly))
+    generate(slowly)
+    assert motion(slowly) == followed
+
+
+def half_written(armature: Any) -> dict[Any, Any]:
+    """Let an action get some of its keys; those that it had."""
+    before = motion(armature)
+    drag_route(armature)
+    bpy.context.view_layer.update()
+    live.run_pending()
+    name, _ = as_written(armature)
+    for _ in range(3):
+        live._go_on(name, 0.0)
+    assert motion(armature) != before
+    return before
+
+
+def test_an_action_that_is_half_written_is_given_back(slowly: Any) -> None:
+    before = half_written(slowly)
+    settings_of(slowly).live = False
+    live.finish_following()
+    assert motion(slowly) == before
+    assert not actions.is_edited(action_of(slowly))
+
+
+def test_an_action_that_is_half_written_is_given_back_where_the_next_one_cannot_be(
+    slowly: Any,
+) -> None:
+    before = half_written(slowly)
+    settings_of(slowly).frame_end = settings_of(slowly).frame_start
+    assert settle()
+    assert settings_of(slowly).live_error
+    assert motion(slowly) == before
+    assert not actions.is_edited(action_of(slowly))
+
+
+def test_a_drag_while_an_action_is_half_written_is_followed(slowly: Any) -> None:
+    before = half_written(slowly)
+    drag_route(slowly)
+    assert settle()
+    followed = motion(slowly)
+    assert followed != before
+    assert settings_of(slowly).live
+    generate(slowly)
+    assert motion(slowly) == followed
+
+
 def test_the_way_and_its_footholds_are_drawn_until_the_motion_is_there(octopus: Any) -> None:
     settings_of(octopus).ground.object = make_square(20.0)
     settle()
@@ -625,6 +756,9 @@ def test_a_skin_that_is_no_child_of_the_octopus_is_followed(octopus: Any) -> Non
         each.co *= 2.0
     skin.data.update()
     assert settle()
+    followed = motion(octopus)
+    generate(octopus)
+    assert motion(octopus) == followed
 
 
 class Unasked:

@@ -155,7 +155,7 @@ SWEEPS: Final = 4
 """Sweeps of CCD over a group. Two or eight change slip, overlap and turns of the ten set-ups on
 bumps by less than a tenth."""
 ROUGH_SWEEPS: Final = 1
-ROUGH_SOFTENINGS: Final = 1
+ROUGH_SOFTENINGS: Final = 2
 """The same of what is to be soon known, and may be off."""
 SOFTENINGS: Final = 4
 """How often bends are spread and the groups closed again. With two Swim has a jerk (as in

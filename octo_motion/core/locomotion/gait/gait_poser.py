@@ -595,6 +595,14 @@ class RoughGaitPoser(GaitPoser):
         depths, middles = self._looked
         return np.maximum(depths, self._floor), middles
 
+    def corrected(self, rough: GaitPoser, exact: GaitPoser) -> RoughGaitPoser:
+        """The same as high as it is exactly, if it is as far off as of another gait the rough one
+        is.
+        """
+        result = copy(self)
+        result.__dict__["clearance"] = self.clearance + exact.clearance - rough.clearance
+        return result
+
 
 def roughly(poser: GaitPoser) -> GaitPoser:
     """The same, but rough."""

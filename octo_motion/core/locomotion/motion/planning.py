@@ -399,6 +399,10 @@ def plan_near(
         near = Nearby(before, float(distance[0]), float(distance[-1]))
     poser = _rough_poser(job, when.lean, anew=anew)
     yield 0.3
+    if isinstance(poser, RoughGaitPoser):
+        rough = _rough_poser(known.job, known.schedule.lean, anew=True)
+        poser = poser.corrected(rough, known.first.poser)
+        yield 0.5
     moving = _gait(job, gait, poser, when.route, lean=when.lean, plane=None, near=near)
     yield 0.7
     walk, standing = None, moving.standing

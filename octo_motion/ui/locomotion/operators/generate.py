@@ -502,7 +502,7 @@ def _changed(
     ground = locomotion_settings(armature).ground.object
     its = _with_parents(ground) if ground is not None else set[bpy.types.ID]()
     found = {"GROUND"} if touched & its else set[str]()
-    if _is_skin(armature, meshes):
+    if _is_skin(armature, meshes) or touched & _with_parents(armature.parent):
         found.add("RIG")
     if touched & (_sources(armature) - its - _route_of(armature)) or not touched & _route_of(
         armature
@@ -829,12 +829,11 @@ def _read_from(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) 
     travels = settings.travel_on == "OBJECT"
     place = armature.scale if travels else [value for row in armature.matrix_world for value in row]
     asked = plain(settings, without=_NO_MATTER)
-    rig: list[Any] = [
-        [*place],
-        armature.rotation_mode,
-        rest,
-        [each.rotation_mode for each in bones],
-    ]
+    hangs = [*armature.delta_location, *armature.delta_rotation_euler]
+    hangs += [*armature.delta_rotation_quaternion]
+    hangs += [value for row in armature.matrix_parent_inverse for value in row]
+    modes = [armature.rotation_mode, *(each.rotation_mode for each in bones)]
+    rig: list[Any] = [[*place], hangs, rest, modes]
     groups = asked, asked["body"], asked["ground"]
     known = [{name: each[name] for name in sorted(_OF_RIG & each.keys())} for each in groups]
     return json.dumps([asked, wishes, rig], sort_keys=True), json.dumps([known, rig])
