@@ -64,7 +64,7 @@ class Bodies:
         self.parent_matrices = parents
         """(bodies, 3, 3) the parents', of roots the world's."""
         arms[tree.roots] = self.roots
-        self.positions = tree.above @ arms
+        self.positions = tree.from_roots(arms)
         """(bodies, 3) of the joints."""
 
     def _parent_turns(self) -> Floats:

@@ -12,8 +12,8 @@ by an impulse λ_c (six numbers each). So
     u_s = H⁻¹ (r − BᵀW_s + Σ G_cᵀ λ_c)
 
 for all segments at once, as one batch of small systems. What is left, in the W and λ of the cuts,
-is a system of twelve for each: substructuring (Craig and Bampton 1968), exact but for rounding.
-With segments of a dozen joints its share is small up to a few hundred of them.
+is a system of twelve for each (see ``cuts``): substructuring (Craig and Bampton 1968), exact but
+for rounding.
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats
-from ..puppet import Figure, Flags
-from .tree import Layout, Tree, solving_cost
+from ..puppet import Figure, Flags, Integers
+from .cuts import Cuts
+from .tree import Layout, Tree, branch_cost
 
-_FIXED_COST: Final = 80.0
+_FIXED_COST: Final = 50.0
 """Microseconds of a solution in segments, whatever they are."""
 _MOST_BENEATH: Final = 3
 """Segments that may hang on one: each widens all systems of the batch."""
-_BETTER: Final = 0.8
+_BETTER: Final = 0.9
 """Of the cost without segments: what they must be below."""
 _UNIT: Final = np.eye(6)
 
@@ -61,12 +62,9 @@ class Segments:
     @property
     def cost(self) -> float:
         """Microseconds of a solution, about."""
-        cuts = sum(parent >= 0 for parent in self.parents)
-        columns = 6 * (1 + self.beneath) + 2
-        width = self.width
-        each = 1.5 + 0.35 * width + 2.0e-2 * (0.3 * width) ** 3
-        each += 2.0e-3 * width * width * columns / 3.0
-        return _FIXED_COST + len(self.bodies) * each + solving_cost(4 * cuts, [])
+        cuts = cuts_of(self)
+        each = branch_cost(self.width, 6 * (1 + self.beneath) + 2)
+        return _FIXED_COST + len(self.bodies) * each + Cuts(len(cuts), _pairs(cuts)).cost
 
 
 def tree_of(figure: Figure) -> Tree:
@@ -112,10 +110,11 @@ class SegmentedTree(Tree):
 
     def __init__(self, figure: Figure, segments: Segments) -> None:
         self.segments = segments
+        self._width = segments.width
         super().__init__(figure, _layout(segments))
 
     def _prepare_blocks(self, filled: Flags) -> None:
-        segments, width = self.segments, self.segments.width
+        segments, width = self.segments, self._width
         count = len(segments.bodies)
         layout = self.layout
         inside = np.zeros((len(self.parents), count))
@@ -148,36 +147,84 @@ class SegmentedTree(Tree):
             sums[number, width, : len(bodies)] = 1.0
         self._sums = sums
         self._prepare_cuts(own)
+        self._prepare_paths(most)
+
+    def _prepare_paths(self, most: int) -> None:
+        """Sums from the roots on: within each segment, and what these add to those that hang there."""
+        segments = self.segments
+        count = len(segments.bodies)
+        # (segments, members, slots) and (segments, members, members).
+        self._along = np.ascontiguousarray(self._sums[:, : self._width].transpose(0, 2, 1))
+        self._among = np.zeros((count, most, most))
+        self._rows = np.zeros(len(self.parents), dtype=np.int64)
+        """(bodies,) where a body is among the members of all segments."""
+        for number, bodies in enumerate(segments.bodies):
+            members = list(bodies)
+            self._among[number, : len(bodies), : len(bodies)] = self.above[np.ix_(members, members)]
+            self._rows[members] = number * most + np.arange(len(bodies))
+        cuts = cuts_of(segments)
+        held_on = [self.parents[segments.bodies[cut.segment][0]] for cut in cuts]
+        self._tip_rows = self._rows[np.array(held_on, dtype=np.int64)]
+        self._carried = np.zeros((count, len(cuts)))
+        """(segments, cuts) 1 where the cut is between the segment and the world."""
+        for number, cut in enumerate(cuts):
+            self._carried[cut.segment] = self._carried[cut.above]
+            self._carried[cut.segment, number] = 1.0
+
+    def _from_roots(self, inside: Floats) -> Floats:
+        """(bodies, numbers) sums from the roots on, of those inside segments (segments, members,
+        numbers).
+        """
+        flat = inside.reshape(-1, inside.shape[2])
+        bases = self._carried @ flat.take(self._tip_rows, 0)
+        inside += bases[:, None]
+        return flat.take(self._rows, 0)
+
+    def velocities(self, speeds: Floats) -> Floats:
+        of_slots = (speeds[:, None, :] @ self.motion).reshape(len(self._along), self._width, 6)
+        return self._from_roots(self._along @ of_slots)
+
+    def from_roots(self, values: Floats) -> Floats:
+        return self._from_roots(self._among @ values.take(self._members, 0))
 
     def _prepare_cuts(self, own: Floats) -> None:
-        segments, width = self.segments, self.segments.width
-        count, beneath = len(segments.bodies), max(segments.beneath, 1)
-        self._hanging = np.array([n for n, each in enumerate(segments.parents) if each >= 0])
-        self._above = np.array([segments.parents[each] for each in self._hanging], dtype=np.int64)
-        place = {int(each): n for n, each in enumerate(self._hanging)}
-        taken = [0] * count
-        numbers: list[int] = []
-        self._paths = np.zeros((count, beneath, width))
-        for each, above in zip(self._hanging, self._above, strict=True):
-            number = taken[above]
-            taken[above] += 1
-            numbers.append(1 + number)
-            on = self.parents[segments.bodies[each][0]]
-            self._paths[above, number] = own[on, above]
-        self._number = np.array(numbers, dtype=np.int64)
-        """(cuts,) which of those that hang on a segment each is, from 1 on."""
+        """What of a segment's answers (one base and its places, six by six) each block is of."""
+        segments, width = self.segments, self._width
+        count, places = len(segments.bodies), 1 + max(segments.beneath, 1)
+        found = cuts_of(segments)
+        self._cuts = Cuts(len(found), _pairs(found))
+        self._paths = np.zeros((count, places - 1, width))
+        for cut in found:
+            on = self.parents[segments.bodies[cut.segment][0]]
+            # Turned round, so that bases and tips come with the same sign.
+            self._paths[cut.above, cut.place - 1] = -own[on, cut.above]
         self._paths = np.repeat(self._paths, 3, axis=2)[..., None]
-        cuts = len(self._hanging)
-        self._cut = np.zeros((cuts, 12, cuts, 12))
-        each = np.arange(cuts)
-        self._cut[each, :6, each, 6:] = self._cut[each, 6:, each, :6] = _UNIT
-        self._each = each
-        self._on_hanging = np.array([n for n in each if self._above[n] in place], dtype=np.int64)
-        self._place_above = np.array(
-            [place[int(self._above[n])] for n in self._on_hanging], dtype=np.int64
-        )
-        same = self._above[:, None] == self._above
-        self._first, self._second = same.nonzero()
+        pairs = _pairs(found)
+        self._blocks = np.zeros((len(pairs) + 1, 12, 12))
+        self._blocks[: len(found), :6, 6:] = self._blocks[: len(found), 6:, :6] = _UNIT
+
+        def number(cut: Cut, first: int, second: int) -> int:
+            return (cut.above * places + first) * places + second
+
+        def listed(numbers: list[int]) -> Integers:
+            return np.array(numbers, dtype=np.int64)
+
+        self._bases = listed([cut.segment * places * places for cut in found])
+        self._tips = listed([number(cut, cut.place, cut.place) for cut in found])
+        beside = [(found[a], found[b], at) for at, (a, b) in enumerate(pairs) if a != b]
+        both = [(a, b, at) for a, b, at in beside if a.above == b.above]
+        self._siblings = listed([at for _, _, at in both])
+        self._of_siblings = listed([number(a, a.place, b.place) for a, b, _ in both])
+        over = [(b, at) for a, b, at in beside if b.above == a.segment]
+        self._over = listed([at for _, at in over])
+        self._of_over = listed([number(b, 0, b.place) for b, _ in over])
+        pairs_at = {pair: at for at, pair in enumerate(pairs)}
+        self._under = listed([pairs_at[pairs[at][::-1]] for _, at in over])
+        # Of each cut the base and the tip that it joins, and of each of these its half of a cut.
+        ends = [(cut.segment * places, cut.above * places + cut.place) for cut in found]
+        self._ends = listed([end for both in ends for end in both])
+        self._shares = np.full(count * places, 2 * len(found))
+        self._shares[self._ends] = np.arange(2 * len(found))
 
     @property
     def cost(self) -> float:
@@ -190,7 +237,7 @@ class SegmentedTree(Tree):
 
     def _by_unknown(self, local: Floats) -> Floats:
         """(slots and segments, columns) of (segments, slots and one, columns)."""
-        width = self.segments.width
+        width = self._width
         slots = local[:, :width].reshape(len(local) * width, local.shape[-1])
         return np.concatenate([slots, local[:, width]])
 
@@ -201,7 +248,7 @@ class SegmentedTree(Tree):
         if self._onto.shape[1]:
             total = total + self._onto @ flat[bodies:]
         local = self._sums @ total.take(self._members, 0)
-        count, width = len(local), self.segments.width
+        count, width = len(local), self._width
         local = local.reshape(count, width + 1, 6, columns)
         motion = self.motion.reshape(count, width, 3, 6)
         both = (motion @ local[:, :width]).reshape(count, 3 * width, columns)
@@ -231,36 +278,70 @@ class SegmentedTree(Tree):
         return np.concatenate([turned.reshape(3 * slots, -1), bases.reshape(-1, wide.shape[1])])
 
     def solve_all(self, right: Floats) -> Floats:
-        count, width, columns = len(self._left), self.segments.width, right.shape[1]
-        slots = 3 * count * width
-        own = right[:slots].reshape(count, 3 * width, columns)
+        count, size, columns = len(self._left), 3 * self._width, right.shape[1]
+        slots = count * size
+        own = right[:slots].reshape(count, size, columns)
         left = self._left
         cut = left.shape[2]
         answers = np.linalg.solve(self._inner, np.concatenate([left, own], axis=2))
+        # Base and places of each segment as they answer each other, and what pulls at them.
         seen = left.transpose(0, 2, 1) @ answers
-        blocks = seen[:, :, :cut].reshape(count, cut // 6, 6, cut // 6, 6)
-        asked = seen[:, :, cut:].reshape(count, cut // 6, 6, columns)
-        hanging, above, number = self._hanging, self._above, self._number
-        matrix, each = self._cut, self._each
-        matrix[each, :6, each, :6] = self._whole[hanging] - blocks[hanging, 0, :, 0]
-        first, second = self._first, self._second
-        matrix[first, 6:, second, 6:] = -blocks[above[first], number[first], :, number[second]]
-        on, over = self._on_hanging, self._place_above
-        between = blocks[above[on], 0, :, number[on]] - _UNIT
-        matrix[over, :6, on, 6:] = between
-        matrix[on, 6:, over, :6] = between.transpose(0, 2, 1)
-        wanted = np.empty((len(each), 12, columns))
-        bases = right[slots:].reshape(count, 6, columns)
-        wanted[:, :6] = bases[hanging] - asked[hanging, 0]
-        wanted[:, 6:] = asked[above, number]
-        size = 12 * len(each)
-        found = np.linalg.solve(matrix.reshape(size, size), wanted.reshape(size, columns))
-        found = found.reshape(len(each), 12, columns)
-        shares = np.zeros((count, cut // 6, 6, columns))
-        shares[hanging, 0] = -found[:, :6]
-        shares[above, number] = found[:, 6:]
-        own = answers[:, :, cut:] + answers[:, :, :cut] @ shares.reshape(count, cut, columns)
-        return np.concatenate([own.reshape(slots, columns), -shares[:, 0].reshape(-1, columns)])
+        np.negative(seen, out=seen)
+        seen[:, :6, :6] += self._whole
+        seen[:, :6, cut:] += right[slots:].reshape(count, 6, columns)
+        places = cut // 6
+        inner = seen[:, :, :cut].reshape(count, places, 6, places, 6).transpose(0, 1, 3, 2, 4)
+        asked = seen[:, :, cut:].reshape(count * places, 6, columns).take(self._ends, 0)
+        self._fill_cuts(inner.reshape(-1, 6, 6))
+        found = self._cuts.solve(self._blocks, asked.reshape(-1, 12, columns))
+        shares = found.reshape(-1, 6, columns).take(self._shares, 0)
+        shares = shares.reshape(count, cut, columns)
+        own = answers[:, :, cut:] - answers[:, :, :cut] @ shares
+        return np.concatenate([own.reshape(slots, columns), shares[:, :6].reshape(-1, columns)])
+
+    def _fill_cuts(self, inner: Floats) -> None:
+        """Take over (segments × places × places, 6, 6) how bases and places answer each other."""
+        blocks = self._blocks
+        count = len(self._bases)
+        blocks[:count, :6, :6] = inner.take(self._bases, 0)
+        blocks[:count, 6:, 6:] = inner.take(self._tips, 0)
+        if len(self._siblings):
+            blocks[self._siblings, 6:, 6:] = inner.take(self._of_siblings, 0)
+        between = inner.take(self._of_over, 0)
+        between -= _UNIT
+        blocks[self._over, :6, 6:] = between
+        blocks[self._under, 6:, :6] = between.transpose(0, 2, 1)
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Where one segment hangs on another."""
+
+    segment: int
+    above: int
+    """The segment that it hangs on."""
+    place: int
+    """Which of those that hang there it is, from 1 on."""
+
+
+def cuts_of(segments: Segments) -> list[Cut]:
+    """All cuts, in the order of the segments that hang by them."""
+    taken = [0] * len(segments.bodies)
+    found: list[Cut] = []
+    for segment, above in enumerate(segments.parents):
+        if above >= 0:
+            taken[above] += 1
+            found.append(Cut(segment, above, taken[above]))
+    return found
+
+
+def _pairs(cuts: list[Cut]) -> list[tuple[int, int]]:
+    """Cuts of the same segment, each with itself first."""
+    touching = [{cut.segment, cut.above} for cut in cuts]
+    count = range(len(cuts))
+    return [(n, n) for n in count] + [
+        (a, b) for a in count for b in count if a != b and touching[a] & touching[b]
+    ]
 
 
 def _layout(segments: Segments) -> Layout:

@@ -175,6 +175,10 @@ class Tree:
         """V (bodies, 6) of u (slots, 3)."""
         return self.chain @ (speeds[:, None, :] @ self.motion)[:, 0, :]
 
+    def from_roots(self, values: Floats) -> Floats:
+        """(bodies, numbers) sums over each body and all between it and the world."""
+        return self.above @ values
+
     def assemble(self, carried: Floats, joints: Floats) -> None:
         """Fill the matrix of (1).
 
@@ -245,14 +249,16 @@ def plan(parents: Integers, above: Floats) -> Layout:
 
 
 def solving_cost(trunk: int, sizes: list[int]) -> float:
-    """Microseconds of a solution, about; measured with numpy's OpenBLAS on one core."""
-    whole = 8.0 + 0.6 * trunk + 2.0e-2 * (0.3 * trunk) ** 3
+    """Microseconds of filling and solving, about; measured with numpy's OpenBLAS on one core."""
+    whole = 6.0 + 0.3 * trunk + 0.0525 * trunk**2 + 2.2e-4 * trunk**3
     if not sizes:
         return whole
-    width = max(sizes)
-    columns = 3.0 * trunk + 2.0
-    each = 1.5 + 0.35 * width + 2.0e-2 * (0.3 * width) ** 3 + 2.0e-3 * width * width * columns / 3.0
-    return whole + 14.0 + len(sizes) * each
+    return whole + 20.0 + len(sizes) * branch_cost(max(sizes), 3 * trunk + 2)
+
+
+def branch_cost(width: int, columns: int) -> float:
+    """Microseconds of one of a batch of small systems with so many right sides, about."""
+    return 1.0 + 0.25 * width + (0.06 + 0.002 * columns) * width**2 + 2.2e-4 * width**3
 
 
 def _diagonal_blocks(matrices: Floats) -> Floats:

@@ -354,7 +354,7 @@ class World:
         speeds, turning = solution.speeds, solution.velocities[:, :3]
         if solution.moving is not None:
             speeds = solution.moving
-            turning = tree.above @ speeds[tree.joint_slot]
+            turning = tree.from_roots(speeds.take(tree.joint_slot, 0))
         bodies.move(h * turning, h * speeds.take(tree.shift_slot, 0))
         if springs is not None:
             # The spring is at q_f now; its rest has moved by what flowed.
