@@ -76,7 +76,7 @@ def stepped(step: float, lasts: float = LASTS) -> tuple[Floats, Floats, Floats, 
         answer = law.respond(law.at_rest(spring * axis), speed * axis)
         speed += step * (pushed + answer.load[0, 0]) / (MASS + step * answer.slope[0, 0, 0])
         answer = law.respond(law.at_rest(spring * axis), speed * axis)
-        flow = 0.0 if answer.flows is None else float(answer.flow_of(np.array([0]))[0, 0])
+        flow = 0.0 if answer.flows is None else float(answer.flows_with()[0, 0])
         spring += step * (speed - flow)
         moved += step * speed
         rows.append(((number + 1) * step, moved, speed, spring))

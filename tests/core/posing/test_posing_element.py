@@ -57,7 +57,7 @@ DISCRETE = {
 
 def flow_of(answer: ElementResponse) -> Floats:
     """(1, 3) w_d of one element."""
-    return np.zeros((1, 3)) if answer.flows is None else answer.flow_of(answer.flows.nonzero()[0])
+    return np.zeros((1, 3)) if answer.flows is None else answer.flows_with()
 
 
 def scalar_law(step: float) -> PlasticLaw:

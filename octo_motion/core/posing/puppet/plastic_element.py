@@ -42,7 +42,8 @@ _ONES = np.ones(3)
 _UNIT = np.eye(3)
 
 
-@dataclass(frozen=True, eq=False)
+# Not frozen, as a frozen one takes eight times as long to make, in every step.
+@dataclass(eq=False)
 class ElementResponse:
     """How the elements answer a relative angular velocity w over one step."""
 
@@ -51,45 +52,66 @@ class ElementResponse:
     """(joints, 3) λ, the torque on the child, N·m."""
     trial: Floats
     """(joints, 3) λ_e, what it would be without flow."""
-    size: Floats
-    """(joints,) |λ_e|; of no account where nothing flows."""
     flows: Flags | None
     """(joints,) where the series damper moves; None where all hold: the load is linear in w."""
+    which: Integers
+    """(which,) those joints."""
+    toward: Floats
+    """(which, 3) of these, λ_e/|λ_e|; …"""
+    size: Floats
+    """(which,) … and |λ_e|."""
     flow: Floats | None = None
-    """(joints, 3) w_d; None where it follows from the load, see ``flow_of``."""
+    """(which, 3) w_d; None where it follows from the load, see ``flows_with``."""
     bent: Floats | None = None
-    """(joints, 3, 3) the slope where something flows; None likewise."""
+    """(which, 3, 3) the slopes; None likewise."""
 
     @property
     def slope(self) -> Floats:
         """(joints, 3, 3) −∂λ/∂w, symmetric and positive semidefinite, N·m·s/rad."""
-        law = self.law
-        if self.flows is None:
-            return law.diagonal
+        slope = self.law.diagonal
+        if self.flows is not None:
+            slope = slope.copy()
+            slope[self.which] = self.bends()
+        return slope
+
+    def bends(self) -> Floats:
+        """(which, 3, 3) the slopes of what flows."""
         if self.bent is not None:
             return self.bent
         # Along s only what the flow leaves, across it also the turning of s.
-        which = self.flows.nonzero()[0]
-        size = self.size.take(which) + _TINY
-        toward = self.trial.take(which, 0) / size[:, None]
+        law, which, toward = self.law, self.which, self.toward
         gain = law.backward.take(which)
-        ratio = gain * law.shared_yield.take(which) / size
+        ratio = gain * law.shared_yield.take(which) / self.size
         across = gain * law.kept.take(which) + ratio
         blocks = across[:, None, None] * _UNIT
         blocks -= (ratio[:, None] * toward)[:, :, None] * toward[:, None, :]
-        slope = law.diagonal.copy()
-        slope[which] = blocks
-        return slope
+        return blocks
 
-    def flow_of(self, which: Integers) -> Floats:
-        """(which, 3) w_d, rad/s, of those elements, of which each flows."""
+    def flows_with(self) -> Floats:
+        """(which, 3) w_d, rad/s, of what flows."""
         if self.flow is not None:
-            return self.flow.take(which, 0)
-        law = self.law
-        size = self.size.take(which)
-        excess = (size - law.yield_torque.take(which)) / (size + _TINY)
-        toward = self.trial.take(which, 0) * excess[:, None]
-        return -toward * law.compliance.take(which)[:, None]
+            return self.flow
+        law, which = self.law, self.which
+        excess = (law.yield_torque.take(which) - self.size) * law.compliance.take(which)
+        return self.toward * excess[:, None]
+
+    def planes(self, at_rest: Floats, speeds: Floats | None) -> tuple[Floats, Floats]:
+        """The impulse over a step as a plane that touches it at w (joints, 3): p = right − slope w,
+        (joints, 3, 3) and (joints, 3).
+
+        ``at_rest`` is the load at rest; without w it is where elements have the load ``trial``.
+        What holds is its own plane, whatever w is.
+        """
+        law, which = self.law, self.which
+        slopes, right = law.held.copy(), law.step * at_rest
+        bent = law.step * self.bends()
+        if speeds is None:
+            at = law.speed_at(which, at_rest.take(which, 0) - self.trial.take(which, 0))
+        else:
+            at = speeds.take(which, 0)
+        slopes[which] = bent
+        right[which] = law.step * self.load.take(which, 0) + (bent @ at[:, :, None])[:, :, 0]
+        return slopes, right
 
 
 class PlasticLaw:
@@ -114,6 +136,9 @@ class PlasticLaw:
         self.shared_yield = self.share * np.where(yields, self.yield_torque, 0.0)
         """G τ/(D_d + G)."""
         self.can_flow = bool(np.any((self.compliance > 0.0) & yields))
+        self._stiffness3 = np.tile(-self.stiffness[:, None], 3)
+        self._backward3 = np.tile(self.backward[:, None], 3)
+        self._square_yield = self.yield_torque * self.yield_torque
         self.diagonal = self.backward[:, None, None] * _UNIT
         """(joints, 3, 3) slope of an element that holds."""
         self.held = step * self.diagonal
@@ -123,37 +148,43 @@ class PlasticLaw:
         """The law of a step in world axes, of bones with axes (joints, 3, 3)."""
         return self
 
-    def speed_at(self, at_rest: Floats, trial: Floats) -> Floats:
-        """(joints, 3) w at which an element with that load at rest has the λ_e ``trial``."""
-        return (at_rest - trial) * self.mobility[:, None]
+    def speed_at(self, which: Integers, change: Floats) -> Floats:
+        """(which, 3) w that takes so much from the loads (which, 3) of elements without flow."""
+        return change * self.mobility.take(which)[:, None]
 
     def at_rest(self, spring: Floats) -> Floats:
         """−K_f q_f (joints, 3), the load at rest without flow."""
-        return -self.stiffness[:, None] * spring
+        return self._stiffness3 * spring
 
     def drawn(self, speed: Floats) -> Floats:
         """G w (joints, 3), the load on what stands still while the spring's rest turns with w."""
-        return self.backward[:, None] * speed
+        return self._backward3 * speed
 
     def respond(self, at_rest: Floats, speed: Floats) -> ElementResponse:
         """The response from the load at rest (joints, 3) and w (joints, 3) at the step's end."""
-        return self.answer(at_rest - self.backward[:, None] * speed)
+        return self.answer(at_rest - self._backward3 * speed)
 
     def answer(self, trial: Floats) -> ElementResponse:
         """The same from λ_e (joints, 3)."""
         if not self.can_flow:
-            return ElementResponse(self, trial, trial, _NONE, None)
-        size = np.sqrt((trial * trial) @ _ONES)
+            return _held(self, trial)
+        square = (trial * trial) @ _ONES
         # With a threshold of 0 it flows even at rest: there its law is linear.
-        flows = size >= self.yield_torque
-        if not flows.any():
-            return ElementResponse(self, trial, trial, size, None)
+        flows = square >= self._square_yield
         which = flows.nonzero()[0]
-        factor = self.shared_yield.take(which) / (size.take(which) + _TINY)
-        factor += self.kept.take(which)
+        if not len(which):
+            return _held(self, trial)
+        size = np.sqrt(square.take(which)) + _TINY
+        toward = trial.take(which, 0) / size[:, None]
         load = trial.copy()
-        load[which] = trial.take(which, 0) * factor[:, None]
-        return ElementResponse(self, load, trial, size, flows)
+        borne = self.shared_yield.take(which) + self.kept.take(which) * size
+        load[which] = toward * borne[:, None]
+        return ElementResponse(self, load, trial, flows, which, toward, size)
+
+
+def _held(law: PlasticLaw, trial: Floats) -> ElementResponse:
+    """Where nothing flows."""
+    return ElementResponse(law, trial, trial, None, _NOBODY, _NO_ROWS, _NO_ONES)
 
 
 class AxisLaw(PlasticLaw):
@@ -181,9 +212,12 @@ class AxisLaw(PlasticLaw):
         own = (self._back_turned @ vectors[:, :, None])[:, :, 0] * factors
         return (self._frames @ own[:, :, None])[:, :, 0]
 
-    def speed_at(self, at_rest: Floats, trial: Floats) -> Floats:
-        mobility = np.divide(1.0, self._back, out=np.zeros_like(self._back), where=self._back > 0.0)
-        return self._along(mobility, at_rest - trial)
+    def speed_at(self, which: Integers, change: Floats) -> Floats:
+        back = self._back.take(which, 0)
+        mobility = np.divide(1.0, back, out=np.zeros_like(back), where=back > 0.0)
+        frames = self._frames.take(which, 0)
+        own = (change[:, None, :] @ frames)[:, 0] * mobility
+        return (frames @ own[:, :, None])[:, :, 0]
 
     def at_rest(self, spring: Floats) -> Floats:
         return self._along(-self._stiff, spring)
@@ -197,9 +231,9 @@ class AxisLaw(PlasticLaw):
     def answer(self, trial: Floats) -> ElementResponse:
         size = np.sqrt((trial * trial) @ _ONES)
         flows = (size >= self.yield_torque) & (size > 0.0) & self._can_flow
-        if not flows.any():
-            return ElementResponse(self, trial, trial, size, None)
         which = flows.nonzero()[0]
+        if not len(which):
+            return _held(self, trial)
         frames = self._frames.take(which, 0)
         back, limit = self._back.take(which, 0), self.yield_torque.take(which)[:, None]
         own = (trial.take(which, 0)[:, None, :] @ frames)[:, 0]
@@ -210,12 +244,13 @@ class AxisLaw(PlasticLaw):
         firm = speed[:, :, None] * whole[:, :, None] * _UNIT
         firm += limit[:, :, None] * (_UNIT - way[:, :, None] * way[:, None, :])
         inner = back[:, :, None] * (speed[:, :, None] * np.linalg.inv(firm)) * back[:, None, :]
-        slopes = self.diagonal.copy()
-        slopes[which] = frames @ (back[:, :, None] * _UNIT - inner) @ frames.transpose(0, 2, 1)
-        flow, load = np.zeros_like(trial), trial.copy()
-        flow[which] = -(frames @ (speed * way)[:, :, None])[:, :, 0]
+        slopes = frames @ (back[:, :, None] * _UNIT - inner) @ frames.transpose(0, 2, 1)
+        flow = -(frames @ (speed * way)[:, :, None])[:, :, 0]
+        load = trial.copy()
         load[which] -= (frames @ (back * speed * way)[:, :, None])[:, :, 0]
-        return ElementResponse(self, load, trial, size, flows, flow, slopes)
+        size = size.take(which)
+        toward = trial.take(which, 0) / size[:, None]
+        return ElementResponse(self, load, trial, flows, which, toward, size, flow, slopes)
 
 
 def _overstressed(trial: Floats, whole: Floats, limit: Floats) -> Floats:
@@ -253,4 +288,6 @@ def _three(coefficients: Floats) -> Floats:
 _MOST_ROUNDS = 60
 _LEAST_SPEED = 1e-12
 """rad/s"""
-_NONE = np.zeros(0)
+_NOBODY = np.zeros(0, np.int64)
+_NO_ROWS = np.zeros((0, 3))
+_NO_ONES = np.zeros(0)

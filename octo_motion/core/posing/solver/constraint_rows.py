@@ -42,7 +42,7 @@ _UNIT = np.eye(3)
 _ONES = np.ones(3)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Holds:
     """Points held in place and turns held back; rows of pins and grabs."""
 
@@ -58,8 +58,9 @@ class Holds:
     """(holds, 3) impulses at rest: p = bias − a w."""
     bounds: Floats
     """(holds,) greatest impulse; inf where there is none."""
-    errors: Floats
-    """(holds, 3) how far they are from where they are pinned, made good without velocity."""
+    errors: Floats | None
+    """(holds, 3) how far they are from where they are pinned, made good without velocity; None
+    where none is pinned."""
 
     def __len__(self) -> int:
         return len(self.bodies)
@@ -68,7 +69,7 @@ class Holds:
 _Touch = tuple[Flags, Flags | None, Floats, Floats, Floats | Flags]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class RowImpulses:
     """What the rows do at some velocities, and what is needed for their slopes."""
 
@@ -90,7 +91,7 @@ class RowImpulses:
     """(holds,) share of the impulse without bound."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Tangent:
     """The rows' laws as planes: p = P y + rest."""
 
@@ -132,7 +133,7 @@ class Pattern:
         self, contacts: Contacts, holds: Holds | None, masses: Floats, step: float, friction: float
     ) -> None:
         """For bodies of masses (bodies,), steps of h and Coulomb's coefficient μ."""
-        self.key = Pattern.key_of(contacts, holds)
+        self._contacts, self._holds = contacts, holds
         count = len(contacts.bodies)
         self.bodies, self.others = contacts.bodies, contacts.others
         if holds is not None:
@@ -168,13 +169,22 @@ class Pattern:
             self._crossed, self._crossing = normals, skew(normals)
         return self._crossing
 
-    @staticmethod
-    def key_of(contacts: Contacts, holds: Holds | None) -> tuple[bytes, ...]:
-        """What tells two patterns apart."""
-        own = (contacts.bodies.tobytes(), contacts.others.tobytes())
-        if holds is None:
-            return own
-        return (*own, holds.bodies.tobytes(), holds.turns.tobytes(), holds.gains.tobytes())
+    def fits(self, contacts: Contacts, holds: Holds | None) -> bool:
+        """Whether the same bodies touch and are held, in the same way."""
+        if not _alike(contacts, self._contacts, ("bodies", "others")):
+            return False
+        if holds is None or self._holds is None:
+            return holds is self._holds
+        return _alike(holds, self._holds, ("bodies", "turns", "gains"))
+
+
+def _alike(one: object, other: object, names: tuple[str, ...]) -> bool:
+    """Whether arrays of two things are equal; most often they are the same ones."""
+    for name in names:
+        first, second = getattr(one, name), getattr(other, name)
+        if first is not second and not np.array_equal(first, second):
+            return False
+    return True
 
 
 class Rows:
@@ -193,12 +203,12 @@ class Rows:
     ) -> None:
         """Put them together, as seen from the common origin (3,) of spatial velocities.
 
-        The pattern and the friction (contacts, 3) of contacts, ``grips``, are those of the step
-        before.
+        The pattern and the friction (contacts, 3) of contacts, ``grips``, across their normals, are
+        those of the step before.
         """
         self.contacts = contacts
         self.holds = holds
-        if pattern is None or pattern.key != Pattern.key_of(contacts, holds):
+        if pattern is None or not pattern.fits(contacts, holds):
             pattern = Pattern(contacts, holds, masses, step, friction)
         self.pattern = pattern
         self.count = len(contacts.bodies)
@@ -225,30 +235,32 @@ class Rows:
         """(contacts,) g/h + μ |w_t|, as ``follow`` was told |w_t| last."""
         self.grips = grips
         """(contacts, 3) b; None for zero."""
-        if grips is not None:
-            normals = contacts.normals
-            self.grips = grips - ((grips * normals) @ _ONES)[:, None] * normals
-        self._ask()
+        self._asked: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.bodies)
 
-    def _ask(self) -> None:
-        """y₀, from the rates."""
+    @property
+    def asked(self) -> Floats:
+        """(rows, 3) y₀: what a row wants to give where its point does not move in the world."""
+        if self._asked is None:
+            self._asked = self._ask()
+        return self._asked
+
+    def _ask(self) -> Floats:
+        """The same, from the rates."""
         count, holds, contacts = self.count, self.holds, self.contacts
-        asked = contacts.normals * (-self.gains * self.rates)[:, None]
+        result = np.empty((len(self.bodies), 3))
+        asked = result if holds is None else result[:count]
+        np.multiply(contacts.normals, (-self.gains * self.rates)[:, None], out=asked)
         if self.grips is not None:
             asked += self.grips
         if contacts.speeds is not None:
             # What counts is how fast the point moves over the surface that it touches.
             asked += self.gains[:, None] * contacts.speeds
-        if holds is None:
-            self.asked = asked
-            return
-        self.asked = np.empty((len(self), 3))
-        """(rows, 3) y₀: what a row wants to give where its point does not move in the world."""
-        self.asked[:count] = asked
-        self.asked[count:] = holds.biases
+        if holds is not None:
+            result[count:] = holds.biases
+        return result
 
     def wanted(self, velocities: Floats) -> Floats:
         """What rows want to give, y (rows, 3), at spatial velocities (bodies, 6)."""
@@ -285,7 +297,7 @@ class Rows:
             return False
         self._followed = slip
         self.rates = self._closing + slip
-        self._ask()
+        self._asked = None
         return True
 
     @property
@@ -314,7 +326,7 @@ class Rows:
         sticks = size <= friction * push
         lift = push + friction * size
         slips = (lift > 0.0) > sticks
-        if not slips.any():
+        if not np.count_nonzero(slips):
             np.multiply(y, sticks[:, None], out=impulses)
             return sticks, None, across, size, sticks
         # What neither sticks nor slips is apart.
@@ -328,7 +340,7 @@ class Rows:
         """The laws as planes that touch them at y."""
         holds, count = self.holds, self.count
         sticks = answer.sticks.tobytes()
-        full = holds is not None and bool((answer.held < 1.0).any())
+        full = holds is not None and bool(np.count_nonzero(answer.held < 1.0))
         if answer.slips is None and not full:
             shares = answer.sticks.astype(np.float64)
             if holds is not None:
@@ -378,7 +390,8 @@ class Rows:
         step = self._step
         room = self.contacts.gaps - self.pattern.deepest_gaps
         deep = bool(count) and room.min() < 0.0
-        off = self.holds is not None and bool(self.holds.errors.any())
+        errors = None if self.holds is None else self.holds.errors
+        off = errors is not None and np.count_nonzero(errors) > 0
         if not (deep or off):
             return None
         result = np.zeros((len(self.bodies), 3))
@@ -386,10 +399,10 @@ class Rows:
             speed = np.clip(-0.2 / step * room, 0.0, fastest)
             result[:count] = speed[:, None] * self.contacts.normals
         if off:
-            assert self.holds is not None
-            speed = 0.2 / step * self.holds.errors
-            length = np.sqrt((speed * speed).sum(axis=1, keepdims=True)) + _TINY
-            result[count:] = speed * np.minimum(fastest / length, 1.0)
+            assert errors is not None
+            speed = 0.2 / step * errors
+            length = np.sqrt((speed * speed) @ _ONES) + _TINY
+            result[count:] = speed * np.minimum(fastest / length, 1.0)[:, None]
         return result
 
 

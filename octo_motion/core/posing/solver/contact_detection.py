@@ -28,7 +28,7 @@ _MOST_SAMPLES: Final = 9
 _TINY: Final = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Contacts:
     """Pairs of points that touch or may within the step."""
 
@@ -70,7 +70,7 @@ class CarriedCapsules:
 _NOBODY: Final = np.zeros(0, np.int64)
 _NO_ROWS: Final = np.zeros((0, 3))
 _NO_ONES: Final = np.zeros(0)
-_NONE: Final = Contacts(_NOBODY, _NOBODY, _NO_ROWS, _NO_ROWS, _NO_ONES, _NOBODY)
+NO_CONTACTS: Final = Contacts(_NOBODY, _NOBODY, _NO_ROWS, _NO_ROWS, _NO_ONES, _NOBODY)
 
 
 @dataclass(eq=False)
@@ -128,14 +128,19 @@ class Detector:
         # Of each box (bodies, 2 ends, 3), in its frame: where ends were last that are not in it.
         self._outside: WeakKeyDictionary[Box, Floats] = WeakKeyDictionary()
 
+    @property
+    def idle(self) -> bool:
+        """Whether no limb can touch another one."""
+        return self._pairs is None
+
     def find(
         self, positions: Floats, matrices: Floats, obstacles: Sequence[Obstacle], margin: float
     ) -> Contacts:
         """Contacts with a gap below ``margin``, m, of bodies whose joints are at positions (bodies,
         3), world, with orientations (bodies, 3, 3).
         """
-        if not obstacles and self._pairs is None:
-            return _NONE
+        if not obstacles and self.idle:
+            return NO_CONTACTS
         ends = self._ends @ matrices.transpose(0, 2, 1)
         ends += positions[:, None]
         found: list[Contacts | None] = []
@@ -215,14 +220,14 @@ class Detector:
         near &= (high[:, None] >= own_low).all(axis=2)
         bodies, which = np.nonzero(near)
         if not len(bodies):
-            return _NONE
+            return NO_CONTACTS
         on_body, on_other = nearest_on_segments(ends[bodies], carried.ends[which])
         away = on_body - on_other
         distance = np.sqrt((away * away).sum(axis=-1))
         gaps = distance - self._radii[bodies] - carried.radii[which] + carried.slack[bodies, which]
         touching = np.flatnonzero((gaps < margin) & (distance > _TINY))
         if not len(touching):
-            return _NONE
+            return NO_CONTACTS
         bodies, which, gaps = bodies[touching], which[touching], gaps[touching]
         normals = away[touching] / distance[touching, None]
         points = on_body[touching] - normals * self._radii[bodies, None]
@@ -485,7 +490,7 @@ _columns: Final = attrgetter(*(each.name for each in fields(Contacts) if each.na
 
 def _joined(found: list[Contacts]) -> Contacts:
     if not found:
-        return _NONE
+        return NO_CONTACTS
     if len(found) == 1:
         return found[0]
     columns = (np.concatenate(column) for column in zip(*map(_columns, found), strict=True))

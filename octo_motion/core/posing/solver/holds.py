@@ -152,19 +152,21 @@ class HoldBuilder:
             self._arrange(holds)
             self._key = key
         # Points: where they are, where they are wanted, and how fast that moves.
-        locals_, targets, speeds = [], [], []
+        locals_, targets, speeds = self._places
+        row = 0
         for hold in holds:
-            locals_.append(hold.point)
-            targets.append(hold.target_position)
-            speeds.append(hold.target_velocity[:3])
+            locals_[row] = hold.point
+            targets[row] = hold.target_position
+            speeds[row] = hold.target_velocity[:3]
+            row += 1
             if hold.turns:
-                locals_.append(_NOTHING)
-                targets.append(_NOTHING)
-                speeds.append(hold.target_velocity[3:])
+                speeds[row] = hold.target_velocity[3:]
+                row += 1
         held = self._bodies
-        arms = (bodies.matrices.take(held, 0) @ np.array(locals_)[:, :, None])[:, :, 0]
-        points = bodies.positions.take(held, 0) + arms
-        ways = np.array(targets) - points
+        arms = (bodies.matrices.take(held, 0) @ locals_[:, :, None])[:, :, 0]
+        points = bodies.positions.take(held, 0)
+        points += arms
+        ways = targets - points
         if len(self._turning):
             ways[self._turning] = self._turns(bodies, holds)
         return Holds(
@@ -172,9 +174,9 @@ class HoldBuilder:
             points,
             self._turns_held,
             self._gains,
-            self._stiffness * ways + self._gains[:, None] * np.array(speeds),
+            self._stiffness * ways + self._gain_column * speeds,
             self._bounds,
-            self._pinned * ways,
+            None if self._pinned is None else self._pinned * ways,
         )
 
     def _turns(self, bodies: Bodies, holds: Sequence[Hold]) -> Floats:
@@ -192,8 +194,9 @@ class HoldBuilder:
         hands = impulses[len(self._bodies) - sum(counts) :] / self._step
         row = 0
         for spring, count in zip(springs, counts, strict=True):
-            spring.wrench = np.zeros(6)
-            spring.wrench[: 3 * count] = hands[row : row + count].ravel()
+            wrench = np.zeros(6)
+            wrench[: 3 * count] = hands[row : row + count].ravel()
+            spring.wrench = wrench
             row += count
 
     def _arrange(self, holds: Sequence[Hold]) -> None:
@@ -212,7 +215,10 @@ class HoldBuilder:
         self._gains = np.array(gains)
         self._stiffness = np.array(stiff)[:, None]
         self._bounds = np.array(bounds)
-        self._pinned = np.array(pinned, dtype=np.float64)[:, None]
+        self._gain_column = self._gains[:, None]
+        self._pinned = np.array(pinned, dtype=np.float64)[:, None] if any(pinned) else None
+        # Of a turn no point counts.
+        self._places = np.zeros((3, len(rows), 3))
 
     def _laws(self, coupling: Coupling) -> tuple[_Law, _Law]:
         """Of a hand's point and of its turn."""
@@ -223,5 +229,3 @@ class HoldBuilder:
             (h * (turning + coupling.turning_damping), turning, h * coupling.torque_limit),
         )
 
-
-_NOTHING = np.zeros(3)

@@ -24,7 +24,7 @@ _OPEN = 5e-4
 """cos² of half the swing; a bone that points backwards has no way to say which way it is bent."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Stops:
     """Ends of joints' ranges that are near: one row each, ``axis · w ≥ −rate``.
 

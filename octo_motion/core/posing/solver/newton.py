@@ -34,7 +34,8 @@ from .problem import SPATIAL, Problem
 from .tree import Tree
 
 
-@dataclass(frozen=True, eq=False)
+# Those that are made in every step are not frozen: that would take eight times as long.
+@dataclass(eq=False)
 class Iterate:
     """Velocities, and what all laws do there."""
 
@@ -54,7 +55,7 @@ class Iterate:
     """What the rows do; None where there are none."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Solution(Iterate):
     """Velocities and impulses after a step."""
 
@@ -72,7 +73,7 @@ class Solution(Iterate):
         return _NO_ROWS if self.rows is None else self.rows.impulses
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class InitialGuess:
     """Where the step before ended."""
 
@@ -86,7 +87,7 @@ class InitialGuess:
     """(stops,) which ends of ranges bore; None begins with what they do at ``speeds``."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class _Tangents:
     """All laws of a step as planes."""
 
@@ -135,7 +136,7 @@ class Newton:
             solved = self._linear(problem, stack, tangents, corrections)
             if corrections is not None:
                 shift = solved[..., 1] - solved[..., 0]
-            end = self._at(problem, np.ascontiguousarray(solved[..., 0]))
+            end = self._at(problem, np.ascontiguousarray(solved[:, :, 0]))
             joints, pushes = _predicted(tangents, end)
             miss = _miss(end, joints, pushes)
             if point is None and miss > _LOST:
@@ -156,7 +157,18 @@ class Newton:
             tangents = self._tangents(problem, end)
         # The shift is added to what was settled on, which need not be where the last system led.
         moving = None if shift is None else end.speeds + shift
-        return Solution(**vars(end), moving=moving, iterations=count, miss=miss)
+        return Solution(
+            end.speeds,
+            end.velocities,
+            end.joint_speeds,
+            end.joint_impulses,
+            end.response,
+            end.pressed,
+            end.rows,
+            moving,
+            count,
+            miss,
+        )
 
     def _begin(self, problem: Problem, start: InitialGuess) -> tuple[Iterate | None, _Tangents]:
         """The first tangents, and the velocities where they touch if all do at the same."""
@@ -170,9 +182,9 @@ class Newton:
         rows = None if start.rows is None else problem.rows.tangent(start.rows)
         if response is None:
             return None, _planes(problem, law.held, self._held, pressed, rows)
-        # The speeds at which they would bear now what they bore then.
-        speeds = law.speed_at(self._base, response.trial)
-        return None, self._bent(problem, response, speeds, pressed, rows)
+        # At the speeds at which they would bear now what they bore then.
+        slopes, right = response.planes(self._base, None)
+        return None, _planes(problem, slopes, right, pressed, rows, linear=False)
 
     def _follow(self, problem: Problem, point: Iterate) -> bool:
         rows = problem.rows
@@ -201,7 +213,7 @@ class Newton:
         stops = problem.stops[0]
         push = _pushes(stops, speeds)
         pressed = push >= 0.0
-        if pressed.any():
+        if np.count_nonzero(pressed):
             impulses += stops.spread @ (np.maximum(push, 0.0)[:, None] * stops.axes)
         return response, impulses, pressed
 
@@ -210,20 +222,8 @@ class Newton:
         rows = None if point.rows is None else problem.rows.tangent(point.rows)
         if point.response.flows is None:
             return _planes(problem, problem.law.held, self._held, point.pressed, rows)
-        return self._bent(problem, point.response, point.joint_speeds, point.pressed, rows)
-
-    def _bent(
-        self,
-        problem: Problem,
-        response: ElementResponse,
-        speeds: Floats,
-        pressed: Flags | None,
-        rows: Tangent | None,
-    ) -> _Tangents:
-        """Planes of elements that flow."""
-        slopes, loads = problem.step * response.slope, problem.step * response.load
-        right = loads + (slopes @ speeds[:, :, None])[:, :, 0]
-        return _planes(problem, slopes, right, pressed, rows, linear=response.flows is None)
+        slopes, right = point.response.planes(self._base, point.joint_speeds)
+        return _planes(problem, slopes, right, point.pressed, rows, linear=False)
 
     def _stack(self, problem: Problem, columns: int) -> Floats:
         """(bodies and rows, 6, 6 + columns) inertias and momenta; those of rows are left open."""

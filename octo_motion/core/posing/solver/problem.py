@@ -21,7 +21,7 @@ from .joint_stops import JointStops, Stops
 from .tree import Tree
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Problem:
     """The velocity LCP of one step; places are seen from the common origin."""
 
@@ -146,7 +146,7 @@ class ProblemBuilder:
         momenta = self._weight.copy()
         linear = momenta[:, 3:]
         linear += self._masses * bodies.linear
-        if forces.any():
+        if np.count_nonzero(forces):
             linear += h * forces[:, :3]
             momenta[:, :3] = h * forces[:, 3:]
         momenta[:, :3] += (skewed @ linear[:, :, None])[:, :, 0]

@@ -82,7 +82,9 @@ class WarmStart:
         self._response = state._response
         self.use_law(law)
         memory = state.contacts
-        self.contacts.set(memory.labels, memory.grips, memory.wanted, memory.slips)
+        self.contacts.set(
+            memory.labels, memory.normals, memory.grips, memory.wanted, memory.slips
+        )
 
 
 class ContactMemory:
@@ -92,12 +94,16 @@ class ContactMemory:
         self.forget()
 
     def forget(self) -> None:
-        self.set(np.zeros(0, np.int64), _NO_ROWS, _NO_ROWS, _NO_ONES)
+        self.set(np.zeros(0, np.int64), _NO_ROWS, _NO_ROWS, _NO_ROWS, _NO_ONES)
 
-    def set(self, labels: Integers, grips: Floats, wanted: Floats, slips: Floats) -> None:
+    def set(
+        self, labels: Integers, normals: Floats, grips: Floats, wanted: Floats, slips: Floats
+    ) -> None:
         """Take over what a snapshot has."""
         self.labels = labels
         self._key = labels.tobytes()
+        self.normals = normals
+        """(contacts, 3) of the step before."""
         self.grips = grips
         """(contacts, 3) friction b of the step before, N·s."""
         self.wanted = wanted
@@ -105,26 +111,32 @@ class ContactMemory:
         self.slips = slips
         """(contacts,) μ |w_t| at its end, m/s; none where it is not known, or nothing slipped."""
         self._answer: RowImpulses | None = None
-        self._normals: Floats | None = None
 
     def grips_of(self, contacts: Contacts) -> Floats | None:
-        """(contacts, 3) b of these contacts, zero for those that are new; None where all are."""
+        """(contacts, 3) b of these contacts, across their normals, zero for those that are new; None
+        where all are.
+        """
         if not (len(self.labels) and len(contacts.labels)):
             return None
+        normals = contacts.normals
         if self.knows(contacts):
-            return self.grips
-        found, same = self._places(contacts)
-        return self.grips.take(found, 0) * same
+            grips = self.grips
+            if normals is self.normals or np.array_equal(normals, self.normals):
+                return grips
+        else:
+            found, same = self._places(contacts)
+            grips = self.grips.take(found, 0) * same
+        return grips - ((grips * normals) @ _ONES)[:, None] * normals
 
     def knows(self, contacts: Contacts) -> bool:
         """Whether these are the contacts of the step before."""
-        return contacts.labels.tobytes() == self._key
+        return contacts.labels is self.labels or contacts.labels.tobytes() == self._key
 
     def before(self, rows: Rows) -> RowImpulses | None:
         """What these rows did in the step before; None where some are new."""
         if len(self.wanted) != len(rows) or not self.knows(rows.contacts):
             return None
-        if self._answer is not None and self._normals is rows.contacts.normals:
+        if self._answer is not None and self.normals is rows.contacts.normals:
             return self._answer
         return rows.respond(self.wanted)
 
@@ -159,9 +171,10 @@ class ContactMemory:
         self.grips = answer.across * shares[:, None]
         self.wanted = answer.wanted
         self.slips = _NO_ONES if answer.slips is None else rows.slip(answer)
-        self._answer, self._normals = answer, contacts.normals
+        self._answer, self.normals = answer, contacts.normals
 
 
 _NO_ROWS = np.zeros((0, 3))
 _NO_ONES = np.zeros(0)
+_ONES = np.ones(3)
 _NOBODY = np.zeros(0, np.int64)

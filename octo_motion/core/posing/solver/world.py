@@ -25,7 +25,7 @@ from ...rotations import IDENTITY, Floats, conjugate, multiply, normalized, rota
 from ..puppet import Elements, Figure, Flags, Integers, Pose, law_of, part_of
 from .bodies import Bodies
 from .constraint_rows import Pattern, Rows
-from .contact_detection import Contacts, Detector, apart_at
+from .contact_detection import NO_CONTACTS, Contacts, Detector, apart_at
 from .holds import Coupling, HandSpring, Hold, HoldBuilder
 from .newton import InitialGuess, Newton, Solution
 from .obstacle_shapes import Obstacle
@@ -332,6 +332,8 @@ class World:
     def _find(self) -> Contacts:
         """Contacts that could carry anything within the step."""
         bodies = self._bodies
+        if not self.obstacles and self._detector.idle:
+            return NO_CONTACTS
         linear = bodies.linear
         fastest = float(((linear * linear) @ _ONES).max()) ** 0.5
         margin = 2e-3 * self._size + 2.0 * self.settings.step * fastest
@@ -347,24 +349,20 @@ class World:
 
     def _move(self, problem: Problem, solution: Solution) -> None:
         h, tree, bodies = self.settings.step, self._tree, self._bodies
-        springs, flowing = None, _NOBODY
-        if solution.response.flows is not None:
-            flowing = solution.response.flows.nonzero()[0]
-            springs = self._springs_after(problem, solution, flowing)
         speeds, turning = solution.speeds, solution.velocities[:, :3]
+        response, springs = solution.response, None
+        if response.flows is not None:
+            springs = self._springs_after(problem, solution, response.which)
         if solution.moving is not None:
             speeds = solution.moving
             turning = tree.from_roots(speeds.take(tree.joint_slot, 0))
-        bodies.move(h * turning, h * speeds.take(tree.shift_slot, 0))
-        if springs is not None:
-            # The spring is at q_f now; its rest has moved by what flowed.
-            bodies.rest_springs_at(springs, flowing)
+        # A spring is at q_f then; its rest moves by what flowed.
+        bodies.move(h * turning, h * speeds.take(tree.shift_slot, 0), springs, response.which)
 
     def _springs_after(self, problem: Problem, solution: Solution, flowing: Integers) -> Floats:
         """(flowing, 3) q_f at the step's end in the parents' frames: eq. 21."""
-        speeds = solution.speeds.take(self._tree.joint_slot.take(flowing), 0)
-        flow = solution.response.flow_of(flowing)
-        springs = problem.springs.take(flowing, 0) + self.settings.step * (speeds - flow)
+        change = solution.joint_speeds.take(flowing, 0) - solution.response.flows_with()
+        springs = problem.springs.take(flowing, 0) + self.settings.step * change
         parents = self._bodies.parent_matrices.take(flowing, 0)
         return (springs[:, None, :] @ parents)[:, 0]
 
@@ -385,5 +383,4 @@ def _same(figure: Figure) -> Flags:
     return owners[:, None] == owners
 
 
-_NOBODY = np.zeros(0, np.int64)
 _ONES = np.ones(3)
