@@ -89,6 +89,8 @@ class RowImpulses:
     """(contacts,) |p_t|/|y_t|; where it slips, what holds it against slipping another way."""
     held: Floats
     """(holds,) share of the impulse without bound."""
+    full: bool = False
+    """Whether some hold gives as much as it can."""
 
 
 @dataclass(eq=False)
@@ -108,7 +110,7 @@ class Tangent:
         """Whether these planes are the law at another place, where nothing slips."""
         if self.planes is not None or self.sticks != answer.sticks.tobytes():
             return False
-        return not len(answer.held) or bool(answer.held.min() == 1.0)
+        return not answer.full
 
     def impulses(self, wanted: Floats) -> Floats:
         """(rows, 3) p at y."""
@@ -230,7 +232,9 @@ class Rows:
         self._followed: Floats | None = None
         self._slip_of: RowImpulses | None = None
         self._slip = _NO_ONES
-        self._closing = np.maximum(contacts.gaps / step, pattern.deepest)
+        self._closing = contacts.gaps
+        if self.count:
+            self._closing = np.maximum(contacts.gaps / step, pattern.deepest)
         self.rates = self._closing
         """(contacts,) g/h + μ |w_t|, as ``follow`` was told |w_t| last."""
         self.grips = grips
@@ -251,13 +255,14 @@ class Rows:
         """The same, from the rates."""
         count, holds, contacts = self.count, self.holds, self.contacts
         result = np.empty((len(self.bodies), 3))
-        asked = result if holds is None else result[:count]
-        np.multiply(contacts.normals, (-self.gains * self.rates)[:, None], out=asked)
-        if self.grips is not None:
-            asked += self.grips
-        if contacts.speeds is not None:
-            # What counts is how fast the point moves over the surface that it touches.
-            asked += self.gains[:, None] * contacts.speeds
+        if count:
+            asked = result if holds is None else result[:count]
+            np.multiply(contacts.normals, (-self.gains * self.rates)[:, None], out=asked)
+            if self.grips is not None:
+                asked += self.grips
+            if contacts.speeds is not None:
+                # What counts is how fast the point moves over the surface that it touches.
+                asked += self.gains[:, None] * contacts.speeds
         if holds is not None:
             result[count:] = holds.biases
         return result
@@ -311,11 +316,17 @@ class Rows:
         if holds is None:
             return RowImpulses(wanted, impulses, *self._touch(wanted, impulses), _NO_ONES)
         pulls = wanted[count:]
-        held = np.minimum(holds.bounds / (np.sqrt((pulls * pulls) @ _ONES) + _TINY), 1.0)
-        np.multiply(pulls, held[:, None], out=impulses[count:])
-        if not count:
-            return RowImpulses(wanted, impulses, _NOBODY, None, _NO_ROWS, _NO_ONES, _NO_ONES, held)
-        return RowImpulses(wanted, impulses, *self._touch(wanted[:count], impulses[:count]), held)
+        held = holds.bounds / (np.sqrt((pulls * pulls) @ _ONES) + _TINY)
+        full = np.count_nonzero(held < 1.0) > 0
+        np.minimum(held, 1.0, out=held)
+        if full:
+            np.multiply(pulls, held[:, None], out=impulses[count:])
+        else:
+            impulses[count:] = pulls
+        touch = _UNTOUCHED
+        if count:
+            touch = self._touch(wanted[:count], impulses[:count])
+        return RowImpulses(wanted, impulses, *touch, held, full=full)
 
     def _touch(self, y: Floats, impulses: Floats) -> _Touch:
         """Contacts' impulses (contacts, 3) at y, and what ``RowImpulses`` tells of them."""
@@ -340,11 +351,11 @@ class Rows:
         """The laws as planes that touch them at y."""
         holds, count = self.holds, self.count
         sticks = answer.sticks.tobytes()
-        full = holds is not None and bool(np.count_nonzero(answer.held < 1.0))
+        full = answer.full
         if answer.slips is None and not full:
-            shares = answer.sticks.astype(np.float64)
-            if holds is not None:
-                shares = np.concatenate([shares, answer.held])
+            shares = answer.held
+            if count:
+                shares = np.concatenate([answer.sticks, shares], dtype=np.float64)
             return Tangent(shares, None, None, sticks)
         planes = np.empty((len(self), 3, 3))
         if count:
@@ -352,7 +363,7 @@ class Rows:
         rest = None
         if holds is not None:
             held = answer.held
-            planes[count:] = held[:, None, None] * _UNIT
+            planes[count:] = held[:, None, None] * _UNIT if full else _UNIT
             if full:
                 pulls = answer.impulses[count:]
                 # Not by the bound: it may have changed since.
@@ -388,8 +399,8 @@ class Rows:
         """
         count = self.count
         step = self._step
-        room = self.contacts.gaps - self.pattern.deepest_gaps
-        deep = bool(count) and room.min() < 0.0
+        room = self.contacts.gaps - self.pattern.deepest_gaps if count else _NO_ONES
+        deep = count > 0 and room.min() < 0.0
         errors = None if self.holds is None else self.holds.errors
         off = errors is not None and np.count_nonzero(errors) > 0
         if not (deep or off):
@@ -409,6 +420,7 @@ class Rows:
 _NOBODY = np.zeros(0, dtype=bool)
 _NO_ROWS = np.zeros((0, 3))
 _NO_ONES = np.zeros(0)
+_UNTOUCHED: _Touch = (_NOBODY, None, _NO_ROWS, _NO_ONES, _NO_ONES)
 _REACH = np.zeros((3, 18))
 _REACH.reshape(3, 3, 6)[:, :, :3] = -skew(np.eye(3))
 _TURNS = np.concatenate([np.eye(3), np.zeros((3, 3))], axis=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The system of a segmented tree's cuts: some twelve unknowns each, that see their neighbours alone.
+"""The system of a segmented tree's cuts: twelve unknowns each, that see their neighbours alone.
 
 A cut's equations, of the velocity W that its segment hangs by and the impulse λ that holds it, have
 blocks of twelve with the cuts of the same two segments and with no others. Every second cut of a
@@ -78,11 +78,18 @@ class Cuts:
         self._rows, self._columns = rows, columns
 
     @property
+    def at_once(self) -> int:
+        """How many are left for one system."""
+        return len(self._matrix)
+
+    @property
     def cost(self) -> float:
         """Microseconds of a solution, about."""
         gone = sum(len(each.gone) for each in self._rounds)
-        size = SIZE * len(self._matrix)
-        return _ROUND_COST * len(self._rounds) + 4.0 * gone + 6.0 + 0.0045 * size**2 + 8e-6 * size**3
+        size = SIZE * self.at_once
+        return (
+            _ROUND_COST * len(self._rounds) + 4.0 * gone + 6.0 + 0.0045 * size**2 + 8e-6 * size**3
+        )
 
     def solve(self, blocks: Floats, right: Floats) -> Floats:
         """(cuts + 1, 12, columns), the last zero, for blocks (pairs + 1, 12, 12), of which the last
@@ -128,22 +135,26 @@ class Cuts:
 def _independent(count: int, pairs: Pairs) -> list[int]:
     """Cuts of which none sees another, and each few of those that are left."""
     beside = _beside(count, pairs)
-    gone: list[int] = []
+    gone: dict[int, None] = {}
     for cut in range(count):
-        if len(beside[cut]) <= _MOST_NEIGHBOURS and not beside[cut].intersection(gone):
-            gone.append(cut)
-    return gone
+        if len(beside[cut]) <= _MOST_NEIGHBOURS and gone.keys().isdisjoint(beside[cut]):
+            gone[cut] = None
+    return list(gone)
 
 
 def _beside(count: int, pairs: Pairs) -> list[set[int]]:
     """Of each cut, those that it sees."""
-    return [{b for a, b in pairs if a == cut != b} for cut in range(count)]
+    result: list[set[int]] = [set() for _ in range(count)]
+    for a, b in pairs:
+        if a != b:
+            result[a].add(b)
+    return result
 
 
 def _round(count: int, pairs: Pairs, gone: list[int]) -> tuple[_Round, Pairs]:
     """The plan for eliminating some cuts, and the pairs that are left."""
     beside = _beside(count, pairs)
-    kept = [cut for cut in range(count) if cut not in gone]
+    kept = sorted(set(range(count)).difference(gone))
     place = {cut: number for number, cut in enumerate(kept)}
     empty, none = len(pairs), len(kept)
     blocks: list[int] = []

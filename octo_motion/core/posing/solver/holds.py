@@ -228,4 +228,3 @@ class HoldBuilder:
             (h * (stiffness + coupling.damping), stiffness, h * coupling.force_limit),
             (h * (turning + coupling.turning_damping), turning, h * coupling.torque_limit),
         )
-

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -52,7 +53,7 @@ class Problem:
     """(2 roots, 3) speeds u at which something else carries the roots: of all their shifts, then
     of all their turns; None where they are free."""
 
-    @property
+    @cached_property
     def spatial(self) -> Floats:
         """(bodies, 6, 6) inertias about the origin: from (ω, v) to (L, l)."""
         return (self.moments @ SPATIAL).reshape(-1, 6, 6)

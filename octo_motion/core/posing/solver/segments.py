@@ -134,9 +134,8 @@ class SegmentedTree(Tree):
         self._halves = np.kron(halves, np.ones((3, 3)))
         self._inner = np.zeros((count, 3 * width, 3 * width))
         self._diagonal = _diagonal(self._inner)
-        index = np.arange(3 * width)
-        self._empty = np.zeros_like(self._inner)
-        self._empty[:, index, index] = np.repeat(~filled, 3).reshape(count, -1)
+        # Empty slots: a one on the diagonal, so that their velocity is zero and harms nobody.
+        self._empty = (~filled).reshape(count, width).nonzero()
         # Sums over the bodies beyond each slot, and over all, of each segment by itself.
         most = max(map(len, segments.bodies))
         self._members = np.zeros((count, most), dtype=np.int64)
@@ -150,7 +149,7 @@ class SegmentedTree(Tree):
         self._prepare_paths(most)
 
     def _prepare_paths(self, most: int) -> None:
-        """Sums from the roots on: within each segment, and what these add to those that hang there."""
+        """Sums from the roots on: within each segment, and what they add to those that hang on."""
         segments = self.segments
         count = len(segments.bodies)
         # (segments, members, slots) and (segments, members, members).
@@ -257,8 +256,8 @@ class SegmentedTree(Tree):
         products = motion @ carried.transpose(0, 2, 1)
         products *= self._halves
         np.add(products, products.transpose(0, 2, 1), out=self._inner)
-        self._inner += self._empty
         self._diagonal += joints.reshape(count, width, 3, 3)
+        self._diagonal[self._empty] = _UNIT[:3, :3]
         ways = motion[:, None] * self._paths
         ways = ways.transpose(0, 2, 1, 3).reshape(count, 3 * width, -1)
         self._left = np.concatenate([carried, ways], axis=2)

@@ -82,9 +82,7 @@ class WarmStart:
         self._response = state._response
         self.use_law(law)
         memory = state.contacts
-        self.contacts.set(
-            memory.labels, memory.normals, memory.grips, memory.wanted, memory.slips
-        )
+        self.contacts.set(memory.labels, memory.normals, memory.grips, memory.wanted, memory.slips)
 
 
 class ContactMemory:
@@ -113,8 +111,8 @@ class ContactMemory:
         self._answer: RowImpulses | None = None
 
     def grips_of(self, contacts: Contacts) -> Floats | None:
-        """(contacts, 3) b of these contacts, across their normals, zero for those that are new; None
-        where all are.
+        """(contacts, 3) b of these contacts, across their normals, zero for those that are new;
+        None where all are.
         """
         if not (len(self.labels) and len(contacts.labels)):
             return None
@@ -164,6 +162,11 @@ class ContactMemory:
                 self.forget()
             return
         contacts = rows.contacts
+        if not rows.count:
+            if len(self.labels) or len(self.slips):
+                self.forget()
+            self.wanted, self._answer, self.normals = answer.wanted, answer, contacts.normals
+            return
         size = answer.shares * answer.size
         shares = answer.shares * np.minimum(most / (size + 1e-300), 1.0)
         if contacts.labels is not self.labels:
