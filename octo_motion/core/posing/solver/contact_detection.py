@@ -128,11 +128,6 @@ class Detector:
         # Of each box (bodies, 2 ends, 3), in its frame: where ends were last that are not in it.
         self._outside: WeakKeyDictionary[Box, Floats] = WeakKeyDictionary()
 
-    @property
-    def idle(self) -> bool:
-        """Whether no limb can touch another one."""
-        return self._pairs is None
-
     def find(
         self, positions: Floats, matrices: Floats, obstacles: Sequence[Obstacle], margin: float
     ) -> Contacts:
@@ -188,6 +183,8 @@ class Detector:
         self._planes.clear()
         pairs = self._all_pairs
         self._pairs = pairs if pairs is None or not bodies else pairs & bare & bare[:, None]
+        self.idle = self._pairs is None
+        """Whether no limb can touch another one."""
 
     def find_solids(
         self, positions: Floats, matrices: Floats, solids: Sequence[Obstacle], margin: float
