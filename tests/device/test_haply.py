@@ -223,6 +223,19 @@ def test_haply_tells_pose_buttons_and_gets_force(service: HaplyService) -> None:
     device.close()
 
 
+def test_haply_tells_how_late_a_force_comes(service: HaplyService) -> None:
+    """As late as the service's answer, and a millisecond of the device's own."""
+    device = open_haply(service)
+    first = wait_for(device.read)
+    assert isinstance(first, Sample)
+    assert first.delay == 0.0, "nothing was sent yet"
+    device.send((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    answer = wait_for(device.read)
+    assert isinstance(answer, Sample)
+    assert 0.001 < answer.delay < 1.0
+    device.close()
+
+
 def test_haply_is_sent_one_message_for_each_state(service: HaplyService) -> None:
     device = open_haply(service)
     wait_for(device.read)

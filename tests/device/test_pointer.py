@@ -50,6 +50,8 @@ class Table:
                     Sample(
                         *(self.now, self.place, self.turn, self.velocity, ZERO),
                         *(self.buttons, self.hand_there),
+                        # It says at once which force has come.
+                        delay=PERIOD,
                     )
                 )
             if held is not None and answer:

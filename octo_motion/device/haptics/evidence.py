@@ -25,7 +25,7 @@ from ...core.rotations.scalars import (
     to_rotation_vector,
 )
 from ..driver import Dynamics, Kind, Sample
-from .force import gains_for
+from .force import DOUBTED, gains_for
 
 _LOOKS_BACK: Final = 0.004
 """s over which positions show a speed."""
@@ -50,6 +50,8 @@ class Evidence:
         """Of the coupling, for the delay that is told or measured, whichever is longer."""
         self._late = self._softened = device.delay
         """s, as measured, and as the gains have it."""
+        self.doubt = DOUBTED
+        """s: forces are under way no longer than this, by what the device shows."""
         self._behind = 0.0
         """s by which the device's clock is behind ours at the least."""
         self._clock = -math.inf
@@ -86,11 +88,18 @@ class Evidence:
         return sample._replace(time=sample.time - max(0.0, behind - self._behind))
 
     def _measure_delay(self, sample: Sample) -> None:
-        """Soften the coupling for a device that answers later than it says.
+        """Learn how late forces come, and soften the coupling for a device that is later than it says.
 
         Forces are as late as the newest that had reached it was, but for the loop's own period.
         """
-        if self._device.force <= 0.0 or not sample.delay:
+        if self._device.force <= 0.0:
+            return
+        shown = min(DOUBTED, sample.delay + self._period) if sample.delay else DOUBTED
+        if sample.delay and shown > self.doubt:
+            self.doubt = shown
+        else:
+            self.doubt += min(1.0, self._period / _LEARNS) * (shown - self.doubt)
+        if not sample.delay:
             return
         late = max(self._device.delay, min(_LATEST, sample.delay - self._period))
         self._late += min(1.0, self._period / _LEARNS) * (late - self._late)

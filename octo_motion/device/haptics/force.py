@@ -31,7 +31,8 @@ So damping alone cannot keep back a strong slow push, as of a puppet that was be
 than the hand did (the simulation's own coupling helps); while the store is nearly empty, what
 drives the hand fades, and smoothly, for a hand that trembles would feel leaps as a buzz.
 
-*Delays* that nobody told are the third: see ``Delays``.
+*Delays* that nobody told are the third: see ``Delays``, and ``UnderWay`` for what neither sees in
+time.
 
 *The shaper* is last: how much force, how fast it may change, and when it ends.
 """
@@ -182,8 +183,18 @@ class Observer:
 
 # --- Delays that nobody told ---------------------------------------------------------------------
 
-_DOUBTED: Final = 0.02
+DOUBTED: Final = 0.02
 """s: the longest delay that a device may have without saying so."""
+LIGHTEST: Final = 0.02
+LIGHTEST_TURN: Final = 1e-4
+"""kg and kg·m²: of a hand with what it holds, at the least."""
+_IN_FLIGHT: Final = 0.0115
+"""J that such a hand may get from forces that are under way, if it goes limp."""
+SUDDEN: Final = 300.0
+SUDDEN_TURN: Final = 3000.0
+"""m/s² and rad/s²: no hand gets faster sooner by itself."""
+_CALMER: Final = 0.2
+"""s in which a hand that was fast counts as a third as fast."""
 _KEPT: Final = 0.005
 """J that any delay may give until the coupling is gone. It is a part of what may come back, for the
 rest comes from forces that are under way and cannot be called back."""
@@ -195,11 +206,45 @@ _LONGEST: Final = 16.0
 """s in which it comes after a grab, and comes back when nothing was left: twice as long each time
 that this was so."""
 _CALMS: Final = 2.0
-"""Times the device's own damping, that takes its place."""
+_CALM_LEFT: Final = 0.03
+"""Times the device's own damping, that takes its place, and the share of it that is never gone: by
+that alone the coupling can come back."""
 GROWS: Final = 25.0
 GROWS_TURNING: Final = 1.0
 """N/s and N·m/s, at most: of what grows faster, too much would be under way before anybody sees
 what it does. Whatever a device can give, for hands are as heavy at a strong one."""
+
+
+class UnderWay:
+    """How much force may be under way to a hand of which nobody knows how heavy it is.
+
+    However soon it is seen that a hand goes limp or turns round, the forces of the time d that they
+    take still come: an impulse J = F d, of which a hand of mass m that goes with v gets
+
+        J v + J² / 2m.
+
+    It is most for the lightest hand, so J is bounded for that. A heavier one gets less. And a hand
+    that is far from what it holds, and comes back by itself as suddenly as a hand can, gets the
+    force on its way: F min(x, ½ a d²) of a distance x.
+    """
+
+    def __init__(self, period: float, most: float, lightest: float, sudden: float) -> None:
+        """For a loop (s), the most force (N, or N·m), the lightest hand (kg, or kg·m²) and how soon
+        it gets faster by itself (m/s², or rad/s²).
+        """
+        self._most, self._lightest, self._sudden = most, lightest, sudden
+        self._calms = math.exp(-period / _CALMER)
+        self._fastest = 0.0
+
+    def most(self, speed: float, apart: float, late: float) -> float:
+        """N, of all that is asked for, for a hand of that speed (m/s), so far (m) from what it
+        holds, and forces so late (s).
+        """
+        speed = self._fastest = max(speed, self._calms * self._fastest)
+        given = speed * speed + 2.0 * _IN_FLIGHT / self._lightest
+        most = min(self._most, self._lightest * (math.sqrt(given) - speed) / late)
+        way = min(apart, 0.5 * self._sudden * late * late)
+        return min(most, _IN_FLIGHT / way) if way > 0.0 else most
 
 
 class Delays:
@@ -219,11 +264,10 @@ class Delays:
     is bent or held.
     """
 
-    def __init__(self, period: float, most: float, grows: float, damping: float) -> None:
-        """For a loop (s), the most force (N, or N·m), how it grows (N/s), the device's damping."""
-        count = math.ceil(_DOUBTED / period) + 2
+    def __init__(self, period: float, grows: float, damping: float) -> None:
+        """For a loop (s), how force (N, or N·m) grows (N/s), and the device's damping."""
+        count = math.ceil(DOUBTED / period) + 2
         self._period = period
-        self._most = most
         self._growth = grows * period
         self._damping = _CALMS * damping
         self._energy = np.full(count, _KEPT)
@@ -260,9 +304,10 @@ class Delays:
         self._share, self._allowed = 0.0, ZERO
         self._forces[:] = 0.0
 
-    def allowed(self, force: Vector, velocity: Vector) -> Vector:
-        """What is left of a coupling's force (N) on a hand of that speed (m/s)."""
-        wanted = max(0.0, min(1.0, self.left(velocity) / (_SOFTENS * _KEPT)))
+    def allowed(self, force: Vector, velocity: Vector, most: float) -> Vector:
+        """What is left of a coupling's force (N), ``most`` of it, on a hand of that speed (m/s)."""
+        left = self.left(velocity)
+        wanted = max(0.0, min(1.0, left / (_SOFTENS * _KEPT)))
         if wanted <= self._share:
             if wanted == 0.0 < self._share:
                 self._patience = min(_LONGEST, max(_AGAIN, 2.0 * self._patience))
@@ -271,13 +316,15 @@ class Delays:
             self._share = min(wanted, self._share + self._period / self._patience)
             if self._share == 1.0:
                 self._patience = max(_BEGINS, self._patience - self._period)
-        # Of what the device can give, for of a hand far away a small share would be much.
-        wish, before = scale(clamp_length(force, self._most), self._share), self._allowed
+        # Of what it may be, for of a hand far away a small share would be much.
+        wish, before = scale(clamp_length(force, most), self._share), self._allowed
         grown = subtract(wish, before)
         if dot(grown, before) >= 0.0:
             wish = add(before, clamp_length(grown, self._growth))
         self._allowed = wish
-        return add_scaled(wish, velocity, (self._share - 1.0) * self._damping)
+        # To a hand that swings so fast that it has turned round by then, it gives as well.
+        calm = max(_CALM_LEFT, min(1.0, 1.0 + left / _KEPT))
+        return add_scaled(wish, velocity, (self._share - 1.0) * calm * self._damping)
 
 
 # --- Limits --------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@ from ...core.rotations.scalars import (
     Vector,
     add,
     add_scaled,
+    clamp_length,
     conjugate,
     integrate,
     length,
@@ -32,11 +33,16 @@ from .force import (
     DAMPING,
     GROWS,
     GROWS_TURNING,
+    LIGHTEST,
+    LIGHTEST_TURN,
     STORED,
+    SUDDEN,
+    SUDDEN_TURN,
     Delays,
     Gains,
     Observer,
     Shaper,
+    UnderWay,
     wrench,
 )
 from .local_model import LocalModel
@@ -91,11 +97,12 @@ class Pointer:
         self._shaper = Shaper(device.force, device.torque)
         self._push = Observer(STORED, DAMPING * device.damping)
         self._turn = Observer(STORED, DAMPING * device.angular_damping)
-        self._delays = [Delays(self.period, device.force, GROWS, device.damping)]
+        self._delays = [Delays(self.period, GROWS, device.damping)]
         """Of pushing, and of turning where the device can."""
         if device.torque > 0.0:
-            turning = (device.torque, GROWS_TURNING, device.angular_damping)
-            self._delays.append(Delays(self.period, *turning))
+            self._delays.append(Delays(self.period, GROWS_TURNING, device.angular_damping))
+        self._under_way = UnderWay(self.period, device.force, LIGHTEST, SUDDEN)
+        self._turn_under_way = UnderWay(self.period, device.torque, LIGHTEST_TURN, SUDDEN_TURN)
         self._evidence = Evidence(device, self.period, who.kind)
         self._model = LocalModel()
         self._answered = 0
@@ -233,13 +240,18 @@ class Pointer:
             self.want(grab=False)
             self._answered = 0
         if self._answered:
-            force = self._delays[0].allowed(force, velocity)
+            late = self._evidence.doubt
+            apart, turned = self._apart()
+            most = self._under_way.most(length(velocity), apart, late)
+            most_torque = self._turn_under_way.most(length(spin), turned, late)
+            force = self._delays[0].allowed(force, velocity, most)
             if len(self._delays) > 1:
-                torque = self._delays[1].allowed(torque, spin)
+                torque = self._delays[1].allowed(torque, spin, most_torque)
             force = self._push.allowed(force, velocity, self.period)
             torque = self._turn.allowed(torque, spin, self.period)
             force = add(force, self._push.damping(force, velocity, self.period))
             torque = add(torque, self._turn.damping(torque, spin, self.period))
+            force, torque = clamp_length(force, most), clamp_length(torque, most_torque)
         alive = self.sample.held or not self.settings.dead_man
         holding = alive and (bool(self._answered and self.grab) or now < self._test_until)
         self._shaper.shape(force, torque, self.period, holding=holding, age=age)
@@ -323,6 +335,12 @@ class Pointer:
             scale(rotate(back, spin), share),
         )
         return force, torque, max(age, now - self._last_answer - self._holds)
+
+    def _apart(self) -> tuple[float, float]:
+        """How far (m at the device) the hand is from what it holds, and turned (rad)."""
+        place, turn = self._model.felt()
+        apart = length(subtract(place, self.position)) / self.workspace.scale
+        return apart, length(to_rotation_vector(multiply(turn, conjugate(self.orientation))))
 
     def _observe(self) -> None:
         """Account for the force of the last period, over the way that the hand went in it."""

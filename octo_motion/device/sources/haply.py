@@ -162,6 +162,9 @@ class Haply(Driver):
             if now - self._answered > _LOST_SECONDS:
                 raise DeviceLostError(self.description.name)
             return None
+        # The service answers each message: its force has come, but for the way to the device.
+        dynamics = self.description.dynamics
+        late = now - self._asked + dynamics.delay if self._asked and dynamics else 0.0
         self._answered, self._asked = now, 0.0
         state = parse(texts[-1], self._device)
         if state is None:
@@ -174,7 +177,7 @@ class Haply(Driver):
         self._device, sample = state
         if self._version < _CONFIGURABLE:
             sample = sample._replace(position=subtract(sample.position, _MIDDLE))
-        return sample._replace(time=now)
+        return sample._replace(time=now, delay=late)
 
     def send(self, force: Vector, torque: Vector) -> None:  # noqa: ARG002 - it has no torque
         """Ask for a force; sent once the service has answered the message before."""

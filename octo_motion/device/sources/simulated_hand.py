@@ -133,7 +133,7 @@ class SimulatedHand(Driver):
         self.hand = hand or Hand(wish=circling)
         self.buttons = 0
         self._clock = clock
-        self._last = clock()
+        self._last = self._sent = clock()
         super().__init__(
             Description(
                 name="Simulated hand",
@@ -153,10 +153,13 @@ class SimulatedHand(Driver):
         return Sample(
             *(now, hand.position, hand.orientation, hand.velocity, hand.angular_velocity),
             self.buttons,
+            # It feels a force at once.
+            delay=now - self._sent,
         )
 
     def send(self, force: Vector, torque: Vector) -> None:
         self.hand.feel(force, torque)
+        self._sent = self._clock()
 
     def close(self) -> None:
         """Nothing to let go."""
