@@ -88,7 +88,7 @@ class Evidence:
         return sample._replace(time=sample.time - max(0.0, behind - self._behind))
 
     def _measure_delay(self, sample: Sample) -> None:
-        """Learn how late forces come, and soften the coupling for a device that is later than it says.
+        """Learn how late forces come; soften the coupling for a device that is later than it says.
 
         Forces are as late as the newest that had reached it was, but for the loop's own period.
         """

@@ -259,9 +259,10 @@ class Delays:
     and what it does itself to meet forces under way.
 
     Where little is left the coupling fades, and damping takes its place: late as it may be, that
-    takes energy from all that a hand does, and so the coupling comes back, the more slowly the more
-    often it was gone. Without delay the same sums come out better, and nothing fades while a limb
-    is bent or held.
+    takes energy from most of what a hand does, and so the coupling comes back, the more slowly the
+    more often it was gone. Where nothing is left, as for a hand that swings so fast that late
+    damping drives it, damping fades as well. Without delay the same sums come out better, and
+    nothing fades while a limb is bent or held.
     """
 
     def __init__(self, period: float, grows: float, damping: float) -> None:

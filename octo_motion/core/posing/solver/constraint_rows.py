@@ -317,7 +317,7 @@ class Rows:
             return RowImpulses(wanted, impulses, *self._touch(wanted, impulses), _NO_ONES)
         pulls = wanted[count:]
         held = holds.bounds / (np.sqrt((pulls * pulls) @ _ONES) + _TINY)
-        full = np.count_nonzero(held < 1.0) > 0
+        full = bool(np.count_nonzero(held < 1.0))
         np.minimum(held, 1.0, out=held)
         if full:
             np.multiply(pulls, held[:, None], out=impulses[count:])

@@ -218,7 +218,7 @@ class SegmentedTree(Tree):
         self._over = listed([at for _, at in over])
         self._of_over = listed([number(b, 0, b.place) for b, _ in over])
         pairs_at = {pair: at for at, pair in enumerate(pairs)}
-        self._under = listed([pairs_at[pairs[at][::-1]] for _, at in over])
+        self._under = listed([pairs_at[pairs[at][1], pairs[at][0]] for _, at in over])
         # Of each cut the base and the tip that it joins, and of each of these its half of a cut.
         ends = [(cut.segment * places, cut.above * places + cut.place) for cut in found]
         self._ends = listed([end for both in ends for end in both])
