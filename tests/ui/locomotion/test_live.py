@@ -439,7 +439,12 @@ def as_planned(armature: Any) -> dict[str, np.ndarray]:
     told: list[bool] = []
     assert work.motion is not None
     tell = work.motion.tell
-    work.motion.tell = lambda each: told.append(True) or tell(each)  # type: ignore[func-returns-value,method-assign]
+
+    def tell_and_note(each: Any) -> None:
+        told.append(True)
+        tell(each)
+
+    work.motion.tell = tell_and_note
     while not told:
         live._go_on(name, 0.0)
         assert live._state.following.get(name) is work

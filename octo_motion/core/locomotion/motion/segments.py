@@ -340,9 +340,11 @@ def _ground(
 ) -> tuple[tuple[Ground, Ground], tuple[str, ...]]:
     """The ground of a walk, as it is and as arms feel it, and what there is to warn of."""
     if cyclic:
-        return (LevelGround(0.0),) * 2, ()
+        level = LevelGround(0.0)
+        return (level, level), ()
     if job.mesh is None and plane is not None:
-        return (LevelGround(plane),) * 2, job.warnings
+        level = LevelGround(plane)
+        return (level, level), job.warnings
     if near is not None and near.same_ground(job, route, reach):
         return (near.standing.ground, near.standing.underfoot), job.warnings
     beyond = 0.0 if route.cyclic else travel.stride + reach

@@ -34,7 +34,7 @@ from ....core.content_cache import content_key
 from ....core.errors import GroundError, SettingsError
 from ....core.follow_through import limbs_of
 from ....core.keyframes import check_bounds
-from ....core.locomotion.body import BodySettings, find_organs
+from ....core.locomotion.body import BodySettings, Organs, find_organs
 from ....core.locomotion.gait import GaitSettings, GaitTable
 from ....core.locomotion.ground import MovingMesh, StanceSettings
 from ....core.locomotion.motion import (
