@@ -257,13 +257,10 @@ class Session:
             self._note_touched()
             self.wake()
 
-    def held_point(self) -> Floats | None:
-        """(3,) where the point in the first hand is, world."""
-        return None if self.held is None else self.world.held_point(self.held)
-
-    def force(self) -> Floats:
-        """(3,) with which the first hand pulls, newton."""
-        return np.zeros(3) if self.held is None else self.held.wrench[:3].copy()
+    def held_point(self, spring: HandSpring | None = None) -> Floats | None:
+        """(3,) where the point in a hand is, the first if it is not said which, world."""
+        spring = spring or self.held
+        return None if spring is None else self.world.held_point(spring)
 
     # --- Time -----------------------------------------------------------------------------------
 

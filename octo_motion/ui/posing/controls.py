@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import Enum
+from types import MappingProxyType
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from ...core.errors import OctoMotionError
 from ...core.phrases import as_phrase, joined_phrases, phrase
 from ...core.posing.picking import Hit
+from ...core.posing.solver import HandSpring
 from ...core.rotations import IDENTITY, Floats, from_axis_angle, multiply
 from .measuring_hand import MeasuringHand
 from .puppet_session import PuppetSession
@@ -61,6 +63,7 @@ _PASSED: Final = frozenset(
 )
 _OWN: Final = frozenset({"G", "P", "K", "O", "R", "Z"})
 """Keys of a session that mean nothing while measuring, and nothing else to Blender either."""
+_NONE: Final[Mapping[HandSpring, tuple[Floats, Floats]]] = MappingProxyType({})
 _ARROWS: Final = {"LEFT_ARROW": -1, "RIGHT_ARROW": 1}
 
 
@@ -95,6 +98,7 @@ class PoseControls:
         """The last thing worth telling."""
         self.hand: Floats | None = None
         """(3,) where the hand is while it holds, world."""
+        self._spring: HandSpring | None = None
         self._turn = IDENTITY.copy()
         self._latched = False
         self._turning = False
@@ -106,20 +110,32 @@ class PoseControls:
         return self.hand is not None
 
     @property
+    def held(self) -> HandSpring | None:
+        """What the hand holds, be there others or not."""
+        return self.session.still_held(self._spring)
+
+    @property
     def help(self) -> tuple[tuple[str, str], ...]:
         return HELP if self.session.measuring is None else MEASURING
 
-    def tick(self, seconds: float) -> None:
+    def tick(
+        self, seconds: float, others: Mapping[HandSpring, tuple[Floats, Floats]] = _NONE
+    ) -> None:
+        """Simulate so many seconds, with this hand and others: see ``PuppetSession.tick``."""
         core = self.session.core
         if core.said:
             self.message, core.said = core.said, ""
         if self.session.measuring is not None:
             self.session.tick(seconds, self.hand)
             return
-        if self.hand is not None and self.session.held is None:
-            # A change of frame has taken the puppet out of the hand.
+        held = self.held
+        if held is None:
+            # A change of frame may have taken the puppet out of the hand.
             self._lose()
-        self.session.tick(seconds, self.hand, self._turn)
+        hands = dict(others)
+        if held is not None and self.hand is not None:
+            hands[held] = self.hand, self._turn
+        self.session.tick(seconds, hands=hands)
 
     def handle(self, event: Any, view: EyeOn | None, x: float = 0.0, y: float = 0.0) -> Outcome:
         """One of Blender's events, or the like, at pixels x and y of the viewport under the mouse,
@@ -247,7 +263,7 @@ class PoseControls:
         hit = self._look(view, x, y)
         if hit is None:
             return Outcome.PASSED
-        self.session.grab(hit.body, hit.point)
+        self._spring = self.session.take(hit.body, hit.point)
         self.hand = hit.point / self.session.unit
         self._turn = IDENTITY.copy()
         self._pixel = x, y
@@ -271,12 +287,12 @@ class PoseControls:
             self.session.step_back()
 
     def _release(self) -> str:
-        keyed = self.session.release()
+        keyed = self.session.release(self._spring)
         return self.session.words_for(keyed) if keyed else self.message
 
     def _pointed_at(self) -> int | None:
         """The body that the hand holds, or else the one under the mouse."""
-        held = self.session.held
+        held = self.held
         return self.hover if held is None else held.body
 
     def _look(self, view: EyeOn, x: float, y: float) -> Hit | None:
@@ -343,13 +359,13 @@ class PoseControls:
                     angle=angle,
                 )
             )
-        elif self.holding and session.held is not None:
-            bone = session.bone(session.held.body)
+        elif (held := self.held) is not None:
+            bone = session.bone(held.body)
             parts.append(
                 phrase(
                     "{bone}: pulled by {pull:.2f} of the figure's weight",
                     bone=bone,
-                    pull=session.pull(),
+                    pull=session.pull(held),
                 )
             )
         elif self.hover is not None:

@@ -20,7 +20,7 @@ from ...core.phrases import phrase
 from ...core.posing.picking import nearest_body
 from ...core.posing.puppet import Pose, bodies_with, part_of
 from ...core.posing.session import HandSample
-from ...core.posing.solver import Coupling
+from ...core.posing.solver import Coupling, HandSpring
 from ...core.rotations import IDENTITY, Floats, from_matrix, from_rotation_vector, multiply
 from ...device.calibration import NONE, Calibration
 from ...device.driver import Kind
@@ -113,14 +113,19 @@ class HandsBase:
         return seconds
 
     @property
+    def held(self) -> HandSpring | None:
+        """What the mouse's hand holds."""
+        return self.mouse.held
+
+    @property
     def hover(self) -> int | None:
-        """The limb that is held, or the first of several; else the one under the mouse."""
+        """The limb that a device holds, or the first of several; else the one under the mouse."""
         raise NotImplementedError
 
     @property
     def holding(self) -> bool:
-        """Whether any hand holds a limb."""
-        return self.hover is not None
+        """Whether a hand at a device holds a limb."""
+        raise NotImplementedError
 
     def trouble(self) -> str:
         """What is wrong with the program at the devices; empty where it answers."""
@@ -411,34 +416,45 @@ def _near(first: Workspace, second: Workspace) -> bool:
 
 
 class NdofHands(HandsBase):
-    """One pointer, moved by the events of a space mouse that Blender itself has.
+    """One pointer, moved by the events of a space mouse that Blender itself has, beside the mouse.
 
     The bridge needs no devices then: it only simulates.
     """
 
     def __init__(
-        self, session: PuppetSession, clock: Callable[[], float] = time.perf_counter
+        self,
+        session: PuppetSession,
+        clock: Callable[[], float] = time.perf_counter,
+        mouse: PoseControls | None = None,
     ) -> None:
+        """Of a session; the mouse may hold something already."""
         super().__init__(session, Client(), clock)
+        self.mouse = mouse or self.mouse
         self.position: Floats | None = None
         """(3,) of the pointer, world; none before the first push."""
+        self._spring: HandSpring | None = None
         self._turn = IDENTITY.copy()
         self._reach = 0.0
 
     @property
     def hover(self) -> int | None:
-        held = self.session.held
-        return None if held is None else held.body
+        held = self.session.still_held(self._spring)
+        return self.mouse.hover if held is None else held.body
+
+    @property
+    def holding(self) -> bool:
+        return self.session.still_held(self._spring) is not None
 
     def shown(self) -> list[ShownPointer]:
         if self.position is None:
             return []
-        held, point = self.hover, self.session.held_point()
-        body = -1 if held is None else held
-        place = self.position if point is None else point
-        return [
-            ShownPointer(0, self.position, place, body, min(1.0, self.session.pull()), NDOF_NAME)
-        ]
+        held = self.session.still_held(self._spring)
+        if held is None:
+            return [ShownPointer(0, self.position, self.position, -1, 0.0, NDOF_NAME)]
+        point = self.session.held_point(held)
+        assert point is not None
+        pull = min(1.0, self.session.pull(held))
+        return [ShownPointer(0, self.position, point, held.body, pull, NDOF_NAME)]
 
     def move(
         self,
@@ -469,7 +485,7 @@ class NdofHands(HandsBase):
     def grab(self) -> None:
         """Grab what is near, or let go."""
         if self.holding:
-            self.session.release()
+            self.session.release(self._spring)
             return
         if self.position is None:
             self.message = "Push the space mouse first"
@@ -481,7 +497,7 @@ class NdofHands(HandsBase):
             return
         self.message = ""
         self._turn = IDENTITY.copy()
-        self.session.grab(body, point)
+        self._spring = self.session.take(body, point)
 
     def recentre(self) -> None:
         """Bring the pointer to the middle of the view, with the next push."""
@@ -489,13 +505,12 @@ class NdofHands(HandsBase):
 
     def tick(self, settings: DeviceSettings, room: ViewRoom | None = None) -> list[Button]:  # noqa: ARG002
         """Simulate what has passed, and pose the armature."""
-        seconds = self.passed()
         self._reach = settings.reach
-        held = self.session.held
+        held = self.session.still_held(self._spring)
         if held is None or self.position is None:
-            self.session.tick(seconds)
+            self.mouse.tick(self.passed())
         else:
-            self.session.tick(seconds, self.position, self._turn)
+            self.mouse.tick(self.passed(), {held: (self.position, self._turn)})
         return []
 
     def trouble(self) -> str:

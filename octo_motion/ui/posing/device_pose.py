@@ -153,7 +153,7 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
         if event.type.startswith("NDOF_"):
             return self._push(context, hands, event)
         leads = event.type in _LEADS or (event.type in _HOLDS and hands.mouse.holding)
-        if leads and isinstance(hands, DeviceHands):
+        if leads:
             return handled(context.window, hands.mouse, event)
         return self._handle(hands, event)
 
@@ -200,7 +200,7 @@ class OCTO_MOTION_OT_pose_device(SessionOperator, bpy.types.Operator):
                 return Outcome.TAKEN if points else Outcome.PASSED
             hands.stop()
             assert self._session is not None
-            hands = self.replace(hands, NdofHands(self._session))
+            hands = self.replace(hands, NdofHands(self._session, mouse=hands.mouse))
             hands.client.start_soon((ALONE,))
             self._session.core.share(hands.client)
         settings = device_settings(context.window_manager)

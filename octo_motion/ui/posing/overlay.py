@@ -51,10 +51,10 @@ def overlay_lines(
         )
         each = np.repeat(colours, 2 * lines.shape[1], axis=0)
         found.append((lines.reshape(-1, 3), each, 1.0))
-    held = session.held
+    held = controls.held
     if held is not None:
         found.append(_one_colour(lines[held.body], _HELD, 2.0))
-        point = session.held_point()
+        point = session.held_point(held)
         if point is not None and controls.hand is not None:
             found.append(_one_colour(arrow_lines(point, controls.hand, eye), _ARROW, 3.0))
     elif controls.hover is not None:

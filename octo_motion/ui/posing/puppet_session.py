@@ -123,8 +123,12 @@ class PosedPuppet:
 
     @property
     def held(self) -> HandSpring | None:
-        """What the hand holds, if it holds anything."""
+        """What the first hand holds, if any holds anything."""
         return self.core.held
+
+    def still_held(self, spring: HandSpring | None) -> HandSpring | None:
+        """What a hand holds, if nothing has taken it out of the hand."""
+        return spring if spring in self.core.world.grabs else None
 
     def bone(self, body: int) -> str:
         return self.figure.names[body]
@@ -150,9 +154,9 @@ class PosedPuppet:
         ends = self.capsules()[0][self.puppet.own]
         return float(np.ptp(ends.reshape(-1, 3), axis=0).max())
 
-    def held_point(self) -> Floats | None:
-        """(3,) the point in the hand, world."""
-        point = self.core.held_point()
+    def held_point(self, spring: HandSpring | None = None) -> Floats | None:
+        """(3,) the point in a hand, the first if it is not said which, world."""
+        point = self.core.held_point(spring)
         return None if point is None else point / self.unit
 
     def loads(self) -> Floats:
@@ -166,15 +170,11 @@ class PosedPuppet:
         """Of the armature's figure: it stands on what is pinned, and on what it touches."""
         return balance_now(self.core, self.puppet.own, self.core.carried())
 
-    def pull(self) -> float:
-        """How hard the hand pulls, in weights of the whole figure."""
+    def pull(self, spring: HandSpring | None = None) -> float:
+        """How hard a hand pulls, the first if it is not said which, in weights of the figure."""
+        spring = spring or self.held
         weight = -GRAVITY[2] * float(self.figure.masses[self.puppet.own].sum())
-        return float(np.linalg.norm(self.core.force())) / weight
-
-    @property
-    def root_is_held(self) -> bool:
-        """Whether the root neither moves nor turns."""
-        return self.settings.root == "HELD"
+        return 0.0 if spring is None else float(np.linalg.norm(spring.wrench[:3])) / weight
 
     def pins(self) -> list[int]:
         """Bodies that the artist has nailed to their places, or that are by the settings."""
@@ -192,11 +192,6 @@ class PosedPuppet:
     def pick(self, origin: Floats, direction: Floats, *, margin: float = 0.0) -> Hit | None:
         """The body that a ray of the world meets; the hit's point is in the puppet's metres."""
         return pick(self.figure, self.shown_pose, origin * self.unit, direction, margin=margin)
-
-    def grab(self, body: int, point: Floats) -> None:
-        """Take hold of a body at a point (3,) in the puppet's metres; what was held is let go."""
-        self.core.release()
-        self._take(body, point)
 
     def grab_bone(self, bone: str, share: float) -> Floats:
         """Take hold of a bone by name, at a share of its length; the point (3,) in the world.
@@ -217,10 +212,12 @@ class PosedPuppet:
         # From the joint to the limb's end, in the middle of which its mass is: of a ball too.
         way = 2.0 * share * self.figure.centres[body]
         point = pose.positions[body] + rotate(pose.orientations[body], way)
-        return self._take(body, point), point / self.unit
+        return self.take(body, point), point / self.unit
 
-    def _take(self, body: int, point: Floats) -> HandSpring:
-        """Take hold with one more hand, and with one on the other side where that is wanted."""
+    def take(self, body: int, point: Floats) -> HandSpring:
+        """Take hold of a body at a point (3,) in the puppet's metres with one more hand, and with
+        one on the other side where that is wanted.
+        """
         spring = self.core.grab(body, point)
         self.missed = ""
         self.traces.begin()

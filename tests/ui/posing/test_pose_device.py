@@ -457,6 +457,80 @@ def test_space_mouse_that_blender_has_poses_without_a_bridge() -> None:
         session.cancel()
 
 
+def test_mouse_holds_a_limb_while_blenders_space_mouse_holds_another() -> None:
+    session = PuppetSession(arm(), bpy.context.scene, clock=None)
+    now = 0.0
+    hands = NdofHands(session, clock=lambda: now)
+    mouse, view = hands.mouse, FrontView()
+
+    def pass_time(ticks: int) -> None:
+        nonlocal now
+        for _ in range(ticks):
+            now += 1.0 / 60.0
+            hands.tick(TOLD)
+
+    def sideways() -> tuple[float, float]:
+        """Where what the mouse holds is, and what the space mouse holds, along X."""
+        point = session.held_point(mouse.held)
+        assert point is not None
+        return float(point[0]), float(hands.shown()[0].coupled[0])
+
+    try:
+        hands.tick(TOLD)
+        hands.move((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, room(), TOLD)
+        hands.grab()
+        assert mouse.handle(Key("LEFTMOUSE"), view, 0.0, 0.95) is Outcome.TAKEN
+        assert hands.holding
+        assert mouse.held is not None
+        assert [session.bone(each.body) for each in session.core.world.grabs] == ["bone2", "bone1"]
+        # The one to the left, the other to the right.
+        mouse.handle(Key("MOUSEMOVE"), view, -0.4, 0.95)
+        for _ in range(60):
+            hands.move((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0 / 60.0, room(), TOLD)
+            pass_time(1)
+        pass_time(60)
+        left, right = sideways()
+        assert left < -0.05
+        assert right > 0.05
+        # Either lets go by itself.
+        point = session.held_point(mouse.held)
+        assert point is not None
+        assert mouse.handle(Key("LEFTMOUSE", "RELEASE"), view, -0.4, 0.95) is Outcome.TAKEN
+        assert mouse.held is None
+        assert hands.holding
+        assert mouse.handle(Key("LEFTMOUSE"), view, point[0], point[2]) is Outcome.TAKEN
+        hands.grab()
+        assert not hands.holding
+        assert mouse.held is not None
+        assert {"bone1", "bone2"} <= set(session.key())
+    finally:
+        hands.stop()
+        session.cancel()
+
+
+def test_a_drag_goes_on_when_blenders_space_mouse_is_pushed_for_the_first_time(
+    hands: DeviceHands,
+) -> None:
+    wait(hands, lambda: hands.session.core.shared, "the bridge simulates")
+    hands.client.devices.clear()
+    mouse, view = hands.mouse, FrontView()
+    assert mouse.handle(Key("LEFTMOUSE"), view, 0.0, 0.95) is Outcome.TAKEN
+    after = NdofHands(hands.session, mouse=hands.mouse)
+    try:
+        assert after.mouse.held is not None
+        mouse.handle(Key("MOUSEMOVE"), view, 0.4, 0.95)
+        for _ in range(120):
+            after.tick(TOLD)
+            time.sleep(0.005)
+        point = hands.session.held_point()
+        assert point is not None
+        assert point[0] > 0.1
+        assert mouse.handle(Key("LEFTMOUSE", "RELEASE"), view, 0.4, 0.95) is Outcome.TAKEN
+        assert hands.session.held is None
+    finally:
+        after.stop()
+
+
 def test_space_mouse_beside_a_force_device_turns_the_view(hands: DeviceHands) -> None:
     """One hand poses, the other one looks at it from all sides."""
     wait(hands, hands.shown, "the hand is there")

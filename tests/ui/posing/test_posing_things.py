@@ -207,7 +207,7 @@ def test_a_thing_itself_can_be_carried_and_pinned(session: PuppetSession, box: A
     hit = session.pick(start + np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]))
     assert hit is not None
     assert session.bone(hit.body) == "Box"
-    session.grab(hit.body, hit.point)
+    session.take(hit.body, hit.point)
     for number in range(40):
         session.tick(TICK, hit.point / session.unit + np.array([0.0, 0.0, 0.01 * number]))
     assert place(box)[2] > 0.25
