@@ -14,7 +14,8 @@ from octo_motion.device import messages as say
 from octo_motion.device.__main__ import _parser
 from octo_motion.device.codec import Codec, Many, Number, Table, Text
 from octo_motion.device.driver import Dynamics
-from octo_motion.device.haptics.force import DAMPER_SHARE, SHARE, STORED, gains_for
+from octo_motion.device.haptics.force import DAMPER_SHARE, SHARE, gains_for
+from octo_motion.device.haptics.passivity import STORED
 from octo_motion.device.hid import force_profile as profile
 from octo_motion.device.hid.system import UDEV_FILE
 from octo_motion.device.sources import packets

@@ -29,13 +29,10 @@ from octo_motion.core.rotations.scalars import (
 from octo_motion.device.driver import FRESH_SECONDS, Dynamics
 from octo_motion.device.haptics.force import (
     DAMPER_SHARE,
-    DAMPING,
     FALL,
     FULL_IN,
     RISE,
     SHARE,
-    STORED,
-    Observer,
     Shaper,
     freshness,
     gains_for,
@@ -43,6 +40,7 @@ from octo_motion.device.haptics.force import (
     wrench,
 )
 from octo_motion.device.haptics.local_model import LocalModel
+from octo_motion.device.haptics.passivity import DAMPING, STORED, Observer
 from octo_motion.device.haptics.schedule import Histogram, Schedule
 from octo_motion.device.messages import HeldMessage, Pull
 from octo_motion.device.sources.simulated_hand import Hand, rest

@@ -25,7 +25,8 @@ from ...core.rotations.scalars import (
     to_rotation_vector,
 )
 from ..driver import Dynamics, Kind, Sample
-from .force import DOUBTED, gains_for
+from .force import gains_for
+from .passivity import DOUBTED
 
 _LOOKS_BACK: Final = 0.004
 """s over which positions show a speed."""

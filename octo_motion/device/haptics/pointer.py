@@ -14,7 +14,6 @@ from ...core.rotations.scalars import (
     Vector,
     add,
     add_scaled,
-    clamp_length,
     conjugate,
     integrate,
     length,
@@ -29,23 +28,9 @@ from ..calibration import NONE, Calibration, Calibrator, corrected
 from ..driver import FRESH_SECONDS, Driver, Dynamics, Kind, Sample
 from ..messages import HandMessage, HeldMessage, Settings, Workspace
 from .evidence import Evidence
-from .force import (
-    DAMPING,
-    GROWS,
-    GROWS_TURNING,
-    LIGHTEST,
-    LIGHTEST_TURN,
-    STORED,
-    SUDDEN,
-    SUDDEN_TURN,
-    Delays,
-    Gains,
-    Observer,
-    Shaper,
-    UnderWay,
-    wrench,
-)
+from .force import Gains, Shaper, wrench
 from .local_model import LocalModel
+from .passivity import Passivity
 
 _FULL_PUSH: Final = 0.1
 """s: a rate device that has not been read for so long stands still."""
@@ -95,14 +80,8 @@ class Pointer:
         self._kind = who.kind
         self._response = self.settings.response()
         self._shaper = Shaper(device.force, device.torque)
-        self._push = Observer(STORED, DAMPING * device.damping)
-        self._turn = Observer(STORED, DAMPING * device.angular_damping)
-        self._delays = [Delays(self.period, GROWS, device.damping)]
-        """Of pushing, and of turning where the device can."""
-        if device.torque > 0.0:
-            self._delays.append(Delays(self.period, GROWS_TURNING, device.angular_damping))
-        self._under_way = UnderWay(self.period, device.force, LIGHTEST, SUDDEN)
-        self._turn_under_way = UnderWay(self.period, device.torque, LIGHTEST_TURN, SUDDEN_TURN)
+        self._push = Passivity(self.period, device.force, device.damping, turns=False)
+        self._turn = Passivity(self.period, device.torque, device.angular_damping, turns=True)
         self._evidence = Evidence(device, self.period, who.kind)
         self._model = LocalModel()
         self._answered = 0
@@ -191,10 +170,8 @@ class Pointer:
         else:
             self._answered = grab
             self._model.begin(message)
-            self._push.forget()
-            self._turn.forget()
-            for each in self._delays:
-                each.begin()
+            self._push.begin()
+            self._turn.begin()
         self._last_answer = now
         self._silence = 0.0
 
@@ -242,16 +219,8 @@ class Pointer:
         if self._answered:
             late = self._evidence.doubt
             apart, turned = self._apart()
-            most = self._under_way.most(length(velocity), apart, late)
-            most_torque = self._turn_under_way.most(length(spin), turned, late)
-            force = self._delays[0].allowed(force, velocity, most)
-            if len(self._delays) > 1:
-                torque = self._delays[1].allowed(torque, spin, most_torque)
-            force = self._push.allowed(force, velocity, self.period)
-            torque = self._turn.allowed(torque, spin, self.period)
-            force = add(force, self._push.damping(force, velocity, self.period))
-            torque = add(torque, self._turn.damping(torque, spin, self.period))
-            force, torque = clamp_length(force, most), clamp_length(torque, most_torque)
+            force = self._push.allowed(force, velocity, apart, late)
+            torque = self._turn.allowed(torque, spin, turned, late)
         alive = self.sample.held or not self.settings.dead_man
         holding = alive and (bool(self._answered and self.grab) or now < self._test_until)
         self._shaper.shape(force, torque, self.period, holding=holding, age=age)
@@ -347,15 +316,10 @@ class Pointer:
         place, turn = self.sample.position, self.sample.orientation
         if self._last is not None:
             before, turn_before = self._last
-            self._push.observe(self._shaper.force, subtract(place, before))
-            moved = to_rotation_vector(multiply(turn, conjugate(turn_before)))
-            self._turn.observe(self._shaper.torque, moved)
-            if self._answered:
-                for delays, force, way in zip(
-                    *(self._delays, (self.force, self.torque), (subtract(place, before), moved)),
-                    strict=False,
-                ):
-                    delays.observe(force, way)
+            turned = to_rotation_vector(multiply(turn, conjugate(turn_before)))
+            holds = bool(self._answered)
+            self._push.observe(self.force, subtract(place, before), holds=holds)
+            self._turn.observe(self.torque, turned, holds=holds)
         self._last = place, turn
 
     def message(self, now: float) -> HandMessage:
