@@ -46,7 +46,7 @@ def sheet() -> Pixels:
     rows = []
     for number in _drag_on(session, lead, _SHOVE, 1.6):
         pose = session.core.pose.positions / session.unit
-        felt = float(np.linalg.norm(session.core.force()))
+        felt = 0.0 if session.held is None else float(np.linalg.norm(session.held.wrench[:3]))
         places = [pose[session.body(each.name)] for each in things]
         rows.append((number / round(1.6 / _TICK), felt, places[2][2], places[3][2]))
         if number == 60:

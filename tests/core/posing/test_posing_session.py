@@ -395,7 +395,7 @@ def test_hand_feels_the_box_that_it_presses_a_limb_into(material: str) -> None:
             for _ in range(30):
                 down = HandSample(point - [0.0, 0.0, deep], IDENTITY)
                 session.tick(TICK, {hand: down})
-            forces.append(-session.force()[2])
+            forces.append(-hand.wrench[2])
         felt[boxes] = np.array(forces)
     assert (np.diff(felt[True]) > 0.0).all()
     # Held still, the joints bear what they yield to; the box pushes back as far as the hand wants.
