@@ -497,14 +497,14 @@ def _timed_follow() -> list[float]:
     draws by software, and other programs, are not in them.
     """
     live: Any = sys.modules[f"{MODULE}.ui.locomotion.operators.generate"]
-    follow, taken = live._follow, []
+    follow, taken = live._state.follow, []
 
     def timed(*arguments: Any, **more: Any) -> None:
         begun = time.thread_time()
         follow(*arguments, **more)
         taken.append(time.thread_time() - begun)
 
-    live._follow = timed
+    live._state.follow = timed
     return taken
 
 

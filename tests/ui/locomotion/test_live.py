@@ -18,6 +18,7 @@ import pytest
 import octo_motion
 from octo_motion.blender.animation import actions
 from octo_motion.blender.scene.contact_markers import markers
+from octo_motion.ui.live import stop_timer
 from octo_motion.ui.locomotion import panels
 from octo_motion.ui.locomotion.operators import generate as live
 from tests.blender.test_ground import make_mesh, make_square
@@ -434,7 +435,7 @@ def as_planned(armature: Any) -> dict[str, np.ndarray]:
     """Go on with what is on its way until it is planned, and the frame in sight no more a sketch;
     that frame.
     """
-    live._stop(live.run_following)
+    stop_timer(live.run_following)
     ((name, work),) = live._state.following.items()
     told: list[bool] = []
     assert work.motion is not None
@@ -446,7 +447,7 @@ def as_planned(armature: Any) -> dict[str, np.ndarray]:
 
     work.motion.tell = tell_and_note
     while not told:
-        live._go_on(name, 0.0)
+        live._state.go_on(name, 0.0)
         assert live._state.following.get(name) is work
     return seen(armature)
 
@@ -503,10 +504,10 @@ def slowly(octopus: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 def as_written(armature: Any) -> tuple[str, Any]:
     """Go on with what is on its way until its action is about to get its first keys; what it is."""
-    live._stop(live.run_following)
+    stop_timer(live.run_following)
     ((name, work),) = live._state.following.items()
     while not work.known:
-        live._go_on(name, 0.0)
+        live._state.go_on(name, 0.0)
     assert live._state.following[name] is work
     assert name == armature.name
     return name, work
@@ -523,7 +524,7 @@ def test_keys_come_a_few_curves_at_a_time_and_none_is_seen_before_all(slowly: An
     steps = 0
     while live._state.following.get(name) is work and not work.job.finished:
         last = motion(slowly)
-        live._go_on(name, 0.0)
+        live._state.go_on(name, 0.0)
         if name in live._state.following:
             now = motion(slowly)
             assert sum(now[place] != last[place] for place in now) <= most
@@ -547,7 +548,7 @@ def half_written(armature: Any) -> dict[Any, Any]:
     live.run_pending()
     name, _ = as_written(armature)
     for _ in range(3):
-        live._go_on(name, 0.0)
+        live._state.go_on(name, 0.0)
     assert motion(armature) != before
     return before
 
@@ -780,11 +781,11 @@ def test_where_nothing_is_live_nobody_looks_at_what_moves(octopus: Any) -> None:
     settings_of(octopus).live = False
     settle()
     told: Any = Unasked()
-    live._after_frame(bpy.context.scene, told)
-    live._after_update(bpy.context.scene, told)
+    live._state.after_frame(bpy.context.scene, told)
+    live._state.after_update(bpy.context.scene, told)
     settings_of(octopus).live = True
     with pytest.raises(AssertionError, match="thousands"):
-        live._after_frame(bpy.context.scene, told)
+        live._state.after_frame(bpy.context.scene, told)
 
 
 def test_while_a_tool_has_the_screen_the_motion_waits(
@@ -793,7 +794,7 @@ def test_while_a_tool_has_the_screen_the_motion_waits(
     before = motion(octopus)
     drag_route(octopus)
     bpy.context.view_layer.update()
-    monkeypatch.setattr(live, "_others_at_work", lambda: True)
+    monkeypatch.setattr(live._state, "must_wait", lambda: True)
     assert live.run_pending() is not None
     assert motion(octopus) == before
     monkeypatch.undo()
@@ -810,7 +811,7 @@ def test_nothing_is_left_of_it_when_the_add_on_is_switched_off() -> None:
         "octo_motion.register()\n"
         "from octo_motion.ui.locomotion.operators import generate as live\n"
         "assert [len(each) for each in known] != before\n"
-        "live._soon('nobody', certain=True)\n"
+        "live._state.soon('nobody', certain=True)\n"
         "assert live.pending()\n"
         "octo_motion.unregister()\n"
         "assert not live.pending()\n"

@@ -1,23 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The motion made: by the button, or live, by itself.
 
-Live, whoever drags a point of the route or a slider sees the motion follow. Blender tells after
-each update what has changed. If that is something that a motion was made from, a timer shows the
-frame in sight as it is going to be, outside the update; what changes in the meantime waits for the
-same turn. Once nothing has changed for a while, the motion is made anew in place, in short turns
-between which Blender goes on. Only an action that was generated and that nobody has edited is
-touched. What our own writing changes is let through Blender's update before we listen again. Where
-nothing is live, Blender is not kept waiting: thousands of objects may move with each frame.
+Live, whoever drags a point of the route or a slider sees the motion follow, see
+:mod:`~octo_motion.ui.live`. Only an action that was generated and that nobody has edited is
+touched.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import bpy
 import numpy as np
@@ -30,13 +25,13 @@ from ....core.errors import OctoMotionError, RigError
 from ....core.locomotion.motion import MotionResult, Sketch
 from ....core.phrases import phrase
 from ...declared_settings import assign, plain
-from ...language import reported, translated
+from ...language import reported
+from ...live import SOON, Live, plays, with_parents
 from ...modal_job import Job, ModalJob
 from ...operator_base import ArmatureOperator
 from ...overlay_lines import Lines, draw_lines
 from ..reading import playing_action, previous_action
 from ..settings import (
-    SWITCHED,
     OCTO_MOTION_PG_locomotion,
     locomotion_settings,
     once_called,
@@ -135,18 +130,9 @@ def _goes(item: bpy.types.Object) -> bool:
     return settings.route is not None or settings.travel_on == "NONE"
 
 
-# --- What is known while a motion is live ---------------------------------------------------------
+# --- Live -----------------------------------------------------------------------------------------
 
 
-_SOON: Final = 0.0
-"""Seconds from a change to the frame in sight at least: what changes together is told together."""
-_IDLE: Final = 0.1
-"""Seconds without a change after which all other frames follow …"""
-_TURN: Final = 0.004
-"""… and for how long at a time, before a step of the work that has begun is let end: it takes about
-as long again."""
-_LATER: Final = 0.3
-"""Seconds until it is tried again, while Blender renders or a tool of ours runs."""
 _NO_MATTER: Final = RESULTS | {
     *(
         "contacts",
@@ -161,6 +147,7 @@ _NO_MATTER: Final = RESULTS | {
 }
 """Settings that the motion does not depend on while it is live; contacts are looked at otherwise.
 """
+_ANYTHING: Final = frozenset({"RIG", "GROUND", "ELSE"})
 
 
 @dataclass
@@ -176,36 +163,128 @@ class _Work:
     """Whether it is worked out, and on its way to the action."""
 
 
-@dataclass
-class _State:
-    """What is known between two updates."""
+class _LiveMotions(Live):
+    """Locomotion that follows."""
 
-    seen: dict[str, str | None] = field(default_factory=dict)
-    """What each live armature's motion was made from, by the object's name."""
-    changed: dict[str, bool] = field(default_factory=dict)
-    """Armatures to look at, and whether it is known already that they changed."""
-    known: dict[str, Shot] = field(default_factory=dict)
-    """What was read of armatures …"""
-    rigs: dict[str, str] = field(default_factory=dict)
-    """… when this was so of their rigs …"""
-    touched: dict[str, set[str]] = field(default_factory=dict)
-    """… and what of it may have changed since: "RIG", "GROUND" or "ELSE", which is not the route.
-    """
-    following: dict[str, _Work] = field(default_factory=dict)
-    """Motions of which no more than the frame in sight is there, by the armature's name."""
-    sketches: dict[str, Sketch] = field(default_factory=dict)
-    """What the frame in sight is drawn from until a motion is planned, by the armature's name."""
-    rates: dict[str, float] = field(default_factory=dict)
-    """Frames per second of each scene."""
-    complete: bool = False
-    """Whether all live armatures of the file are among those seen."""
-    busy: bool = False
+    def __init__(self) -> None:
+        super().__init__()
+        self.known: dict[str, Shot] = {}
+        """What was read of armatures …"""
+        self.rigs: dict[str, str] = {}
+        """… when this was so of their rigs …"""
+        self.touched: dict[str, set[str]] = {}
+        """… and what of it may have changed since: "RIG", "GROUND" or "ELSE", which is not the
+        route."""
+        self.sketches: dict[str, Sketch] = {}
+        """What the frame in sight is drawn from until a motion is planned, by the armature's name.
+        """
+
+    def settings(self, armature: bpy.types.Object) -> OCTO_MOTION_PG_locomotion:
+        return locomotion_settings(armature)
+
+    def sources(self, armature: bpy.types.Object) -> set[bpy.types.ID]:
+        return _sources(armature)
+
+    def made_from(self, armature: bpy.types.Object) -> str:
+        return _read_from(armature, locomotion_settings(armature))[0]
+
+    def make(self, armature: bpy.types.Object) -> None:
+        _make(armature, locomotion_settings(armature))
+
+    def show(self, armature: bpy.types.Object, work: _Work, frame: float) -> None:
+        if work.motion is not None:
+            work.motion.show(armature, frame)
+
+    def give_back(self, armature: bpy.types.Object | None, work: _Work) -> None:
+        if armature is not None and work.motion is not None:
+            work.motion.give_back(armature)
 
     def clear(self) -> None:
-        vars(self).update(vars(_State()))
+        super().clear()
+        for known in (self.known, self.rigs, self.touched, self.sketches):
+            known.clear()
+
+    def drop(self) -> None:
+        super().drop()
+        self.known.clear()
+        self.touched.clear()
+
+    def soon(
+        self,
+        name: str,
+        *,
+        certain: bool,
+        wait: float = SOON,
+        touched: Collection[str] = _ANYTHING,
+    ) -> None:
+        self.touched.setdefault(name, set()).update(touched)
+        super().soon(name, certain=certain, wait=wait)
+
+    def notice(
+        self, armature: bpy.types.Object, touched: set[bpy.types.ID], *, certain: bool
+    ) -> None:
+        meshes = {each for each in touched if isinstance(each, bpy.types.Mesh)}
+        if certain or not touched.isdisjoint(_sources(armature)) or _is_skin(armature, meshes):
+            what = _changed(armature, touched, meshes)
+            self.soon(armature.name, certain=True, touched=what)
+            return
+        marked = {_marked(each) for each in touched if isinstance(each, bpy.types.Object)}
+        own = {armature.name, once_called(locomotion_settings(armature).ground)}
+        if marked & own - {""}:
+            self.soon(armature.name, certain=False, touched={"ELSE"})
+
+    def notice_itself(self, name: str) -> None:
+        # What of its rig has changed is looked at itself.
+        self.soon(name, certain=False, touched={"ELSE"})
+
+    def anew(self, armature: bpy.types.Object, *, certain: bool) -> str | None:
+        name = armature.name
+        now, rig = _read_from(armature, locomotion_settings(armature))
+        if self.seen.get(name) != now:
+            self.touched.setdefault(name, set()).add("ELSE")
+        elif not certain:
+            return None
+        if self.rigs.get(name) != rig:
+            self.touched.setdefault(name, set()).update(_ANYTHING)
+            self.rigs[name] = rig
+        return now
+
+    def work_on(self, armature: bpy.types.Object, work: _Work, seconds: float) -> None:
+        settings = locomotion_settings(armature)
+        there, motion = work.job.work(seconds), work.motion
+        if motion is not None and motion.has_news:
+            with self.deaf():
+                motion.tell(armature)
+            work.lines = motion.lines()
+            _note_sketch(armature, motion)
+        if there and _is_written(armature, settings, work):
+            with self.deaf():
+                _write(armature, motion)
+
+    def saving(self) -> None:
+        for work in self.following.values():
+            if work.known and work.motion is not None:
+                work.motion.take_back()
+                work.job, work.known = Job(iter(())), False
+
+    @persistent
+    def _after_undo(self, *_: object) -> None:
+        # Motions are nearly what they were.
+        sketches = dict(self.sketches)
+        super()._after_undo()
+        self.sketches.update(sketches)
+
+    @persistent
+    def _before_loading(self, *_: object) -> None:
+        super()._before_loading()
+        clear_caches()
 
 
-_state: Final = _State()
+_state: Final = _LiveMotions()
+pending: Final = _state.pending
+run_pending: Final = _state.run_pending
+run_following: Final = _state.run_following
+finish_following: Final = _state.finish_following
 
 
 _drawing: Final[list[Any]] = []
@@ -221,8 +300,7 @@ def _draw() -> None:
 
 def listen() -> None:
     """Listen to Blender."""
-    for handlers, function in _handlers():
-        handlers.append(function)
+    _state.listen()
     _drawing.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_VIEW"))
 
 
@@ -230,228 +308,22 @@ def listen_no_more() -> None:
     """Listen no more, and drop what was about to be made."""
     while _drawing:
         bpy.types.SpaceView3D.draw_handler_remove(_drawing.pop(), "WINDOW")
-    for name in list(_state.following):
-        _let_go(_armature(name), name)
-    _drop()
-    _state.clear()
+    _state.listen_no_more()
     clear_caches()
-    for handlers, function in _handlers():
-        if function in handlers:
-            handlers.remove(function)
-
-
-def _handlers() -> list[tuple[Any, Any]]:
-    known = bpy.app.handlers
-    return [
-        (known.depsgraph_update_post, _after_update),
-        (known.frame_change_post, _after_frame),
-        (known.undo_pre, _before_undo),
-        (known.redo_pre, _before_undo),
-        (known.undo_post, _after_undo),
-        (known.redo_post, _after_undo),
-        (known.save_pre, _before_saving),
-        (known.load_pre, _before_loading),
-        (known.load_post, _after_loading),
-        (known.blend_import_post, _after_import),
-    ]
 
 
 def made(armature: bpy.types.Object, result: MotionResult | None) -> None:
     """Tell that an armature's motion has just been made from its settings as they are."""
+    _state.following.pop(armature.name, None)
     settings = locomotion_settings(armature)
+    assign(settings, "live_error", "")
     if settings.live:
-        _state.seen[armature.name] = _made_from(armature, settings)
+        _state.made(armature)
         if result is not None:
             _state.sketches[armature.name] = Sketch(result.known)
-    _state.following.pop(armature.name, None)
-    assign(settings, "live_error", "")
 
 
-def pending() -> bool:
-    """Whether the frame in sight is about to be made."""
-    return bpy.app.timers.is_registered(run_pending)
-
-
-def run_pending() -> float | None:
-    """What the timer does: show the frame in sight of motions whose sources have changed.
-
-    Returns seconds until it has to be called again, none if all is done.
-    """
-    if _state.busy or _others_at_work():
-        return _LATER
-    changed = dict(_state.changed)
-    _state.changed.clear()
-    for name, certain in changed.items():
-        _follow(name, certain=certain)
-    # From the last change on, not from the first.
-    _stop(run_following)
-    if _state.following:
-        bpy.app.timers.register(run_following, first_interval=0.0 if _plays() else _IDLE)
-    return None
-
-
-def run_following() -> float | None:
-    """What another timer does: all other frames, in short turns.
-
-    Returns seconds until it has to be called again, none if all is done.
-    """
-    if _state.busy or _others_at_work():
-        return _LATER
-    if not pending():
-        for name in list(_state.following)[:1]:
-            _go_on(name, _TURN)
-    return 0.0 if _state.following else None
-
-
-def finish_following() -> None:
-    """Make all motions that are on their way at once."""
-    if pending():
-        _stop(run_pending)
-        run_pending()
-    _stop(run_following)
-    while _state.following:
-        _go_on(next(iter(_state.following)), np.inf)
-
-
-# --- What Blender tells --------------------------------------------------------------------------
-
-
-@persistent
-def _after_update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if _state.busy or depsgraph.mode != "VIEWPORT" or not _listens():
-        return
-    touched = _touched(depsgraph)
-    for each in touched:
-        if isinstance(each, bpy.types.Object) and each.type == "ARMATURE":
-            _look_at(each)
-    rate = _rate(scene)
-    another_rate = rate != _state.rates.get(scene.name, rate)
-    _state.rates[scene.name] = rate
-    marked = {_marked(each) for each in touched if isinstance(each, bpy.types.Object)}
-    meshes = {each for each in touched if isinstance(each, bpy.types.Mesh)}
-    for name in list(_state.seen):
-        armature = _armature(name)
-        if armature is None:
-            del _state.seen[name]
-        elif (
-            (another_rate and name in scene.objects)
-            or not touched.isdisjoint(_sources(armature))
-            or _is_skin(armature, meshes)
-        ):
-            _soon(name, certain=True, touched=_changed(armature, touched, meshes))
-        elif marked & {name, once_called(locomotion_settings(armature).ground)} - {""}:
-            _soon(name, certain=False, touched={"ELSE"})
-
-
-@persistent
-def _after_frame(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """A change that comes together with another frame, as while it plays, is told here alone."""
-    if _state.busy or depsgraph.mode != "VIEWPORT" or not _listens():
-        return
-    _show_again(scene)
-    followed = [each for name in _state.seen if (each := _armature(name)) is not None]
-    sources = [_sources(each) for each in followed]
-    touched = _touched(depsgraph, set(followed).union(*sources))
-    still = {each for each in touched if not _is_animated(each)}
-    for armature, its in zip(followed, sources, strict=True):
-        if armature in touched and not pending():
-            # It moves with every frame: now and then is enough to see whether it is set anew.
-            _soon(armature.name, certain=False, wait=_LATER)
-        if not still.isdisjoint(its):
-            _soon(armature.name, certain=True)
-
-
-def _show_again(scene: bpy.types.Scene) -> None:
-    """Show motions that are on their way as they are going to be at another frame, too."""
-    if not _state.following or _plays():
-        return
-    _state.busy = True
-    try:
-        for name, work in _state.following.items():
-            armature = _armature(name)
-            if armature is not None and work.motion is not None and name in scene.objects:
-                # What is wrong is told when all of it is worked out.
-                with suppress(OctoMotionError):
-                    work.motion.show(armature, scene.frame_current_final)
-    finally:
-        _state.busy = False
-
-
-def _listens() -> bool:
-    """Whether any armature is live; all that are so are known then."""
-    if not _state.complete or not all(map(_armature, _state.seen)):
-        # The add-on was switched on, a file was appended, an armature was renamed.
-        for each in _live_armatures():
-            if each.name not in _state.seen:
-                _state.seen[each.name] = _made_from(each, locomotion_settings(each))
-        _state.rates = {each.name: _rate(each) for each in bpy.data.scenes}
-        _state.complete = True
-    while SWITCHED:
-        armature = _armature(SWITCHED.pop())
-        if armature is not None:
-            _look_at(armature)
-    return bool(_state.seen)
-
-
-def _rate(scene: bpy.types.Scene) -> float:
-    return scene.render.fps / scene.render.fps_base
-
-
-def _touched(
-    depsgraph: bpy.types.Depsgraph, among: set[bpy.types.ID] | None = None
-) -> set[bpy.types.ID]:
-    """What has changed, of all or some, so that something may move; a selection, for one, moves
-    nothing.
-    """
-    found: set[bpy.types.ID] = set()
-    for update in depsgraph.updates:
-        each = cast("bpy.types.ID", update.id.original)  # type: ignore[union-attr]
-        if among is not None and each not in among:
-            continue
-        if (
-            not isinstance(each, bpy.types.Object)
-            or update.is_updated_geometry
-            or update.is_updated_transform
-        ):
-            found.add(each)
-    return found
-
-
-def _is_animated(each: bpy.types.ID) -> bool:
-    """Whether another frame may move it by itself."""
-    item: Any = each
-    while item is not None:
-        data = getattr(item, "data", item)
-        parts = (item, data, getattr(data, "shape_keys", None))
-        if any(getattr(part, "animation_data", None) is not None for part in parts):
-            return True
-        if isinstance(item, bpy.types.Object) and (item.constraints or item.modifiers):
-            return True
-        item = getattr(item, "parent", None)
-    return False
-
-
-def _look_at(armature: bpy.types.Object) -> None:
-    """Begin or cease to follow an armature, or see whether its settings have changed."""
-    name = armature.name
-    if not _is_live(armature):
-        for known in (_state.seen, _state.changed):
-            known.pop(name, None)
-    elif name in _state.seen:
-        # What of its rig has changed is looked at itself.
-        _soon(name, certain=False, touched={"ELSE"})
-    else:
-        _state.seen[name] = None
-        _soon(name, certain=True)
-
-
-def _is_live(armature: bpy.types.Object) -> bool:
-    # Settings come into being when they are looked at: what has none is left without.
-    return (
-        armature.library is None
-        and armature.is_property_set("octo_motion")
-        and locomotion_settings(armature).live
-    )
+# --- What a motion is made from -------------------------------------------------------------------
 
 
 def _marked(item: bpy.types.Object) -> str:
@@ -469,23 +341,9 @@ def _sources(armature: bpy.types.Object) -> set[bpy.types.ID]:
         # What is carried gets keys from us.
         *(each.target for each in settings.reaches if not each.carry),
     ]
-    found: set[bpy.types.ID] = set().union(*(_with_parents(root, armature) for root in roots))
+    found: set[bpy.types.ID] = set().union(*(with_parents(root, armature) for root in roots))
     # Blender tags the armature's data with every pose: its bones are looked at themselves.
     return found | ({settings.weight_curve} - {None})
-
-
-def _with_parents(
-    root: bpy.types.Object | None, until: bpy.types.Object | None = None
-) -> set[bpy.types.ID]:
-    """An object, those that carry it up to another one, and their data."""
-    found: set[bpy.types.ID] = set()
-    each = root
-    while each is not None and each != until:
-        found.add(each)
-        if each.data is not None:
-            found.add(each.data)
-        each = each.parent
-    return found
 
 
 def _route_of(armature: bpy.types.Object) -> set[bpy.types.ID]:
@@ -500,9 +358,9 @@ def _changed(
 ) -> set[str]:
     """What of a motion these are that have changed, besides its route."""
     ground = locomotion_settings(armature).ground.object
-    its = _with_parents(ground) if ground is not None else set[bpy.types.ID]()
+    its = with_parents(ground) if ground is not None else set[bpy.types.ID]()
     found = {"GROUND"} if touched & its else set[str]()
-    if _is_skin(armature, meshes) or touched & _with_parents(armature.parent):
+    if _is_skin(armature, meshes) or touched & with_parents(armature.parent):
         found.add("RIG")
     if touched & (_sources(armature) - its - _route_of(armature)) or not touched & _route_of(
         armature
@@ -514,291 +372,6 @@ def _changed(
 def _is_skin(armature: bpy.types.Object, meshes: set[bpy.types.Mesh]) -> bool:
     """Whether the armature deforms any of these."""
     return bool(meshes) and any(each.data in meshes for each in deformed_meshes(armature))
-
-
-@persistent
-def _before_undo(*_: object) -> None:
-    _drop()
-
-
-@persistent
-def _after_undo(*_: object) -> None:
-    """A step may have been made between a change and the motion that follows from it."""
-    # Motions are nearly what they were.
-    sketches = _state.sketches
-    _state.clear()
-    _state.sketches.update(sketches)
-    for armature in _live_armatures():
-        _state.seen[armature.name] = None
-        _soon(armature.name, certain=True)
-    _state.complete = True
-
-
-@persistent
-def _before_saving(*_: object) -> None:
-    """What is saved belongs together, route and motion."""
-    if not (_state.busy or _others_at_work()):
-        finish_following()
-    for work in _state.following.values():
-        if work.known and work.motion is not None:
-            work.motion.take_back()
-            work.job, work.known = Job(iter(())), False
-
-
-@persistent
-def _before_loading(*_: object) -> None:
-    _drop()
-    _state.clear()
-    clear_caches()
-
-
-@persistent
-def _after_loading(*_: object) -> None:
-    _listens()
-
-
-@persistent
-def _after_import(*_: object) -> None:
-    _state.complete = False
-
-
-def _live_armatures() -> list[bpy.types.Object]:
-    return [each for each in bpy.data.objects if each.type == "ARMATURE" and _is_live(each)]
-
-
-# --- The motion ----------------------------------------------------------------------------------
-
-
-_ANYTHING: Final = frozenset({"RIG", "GROUND", "ELSE"})
-
-
-def _soon(
-    name: str, *, certain: bool, wait: float = _SOON, touched: Collection[str] = _ANYTHING
-) -> None:
-    _state.touched.setdefault(name, set()).update(touched)
-    _state.changed[name] = certain or _state.changed.get(name, False)
-    if not pending():
-        bpy.app.timers.register(run_pending, first_interval=wait)
-
-
-def _drop() -> None:
-    for known in (_state.changed, _state.known, _state.touched, _state.following):
-        known.clear()
-    _stop(run_pending)
-    _stop(run_following)
-
-
-def _stop(timer: Callable[[], float | None]) -> None:
-    if bpy.app.timers.is_registered(timer):
-        bpy.app.timers.unregister(timer)
-
-
-def _plays() -> bool:
-    """Whether any window plays: each frame then shows what the action says."""
-    manager = bpy.context.window_manager
-    return manager is not None and any(
-        each.screen is not None and each.screen.is_animation_playing for each in manager.windows
-    )
-
-
-def _others_at_work() -> bool:
-    """Whether Blender renders, or a modal tool of ours has the screen."""
-    if bpy.app.is_job_running("RENDER"):
-        return True
-    manager = bpy.context.window_manager
-    return manager is not None and any(
-        operator.bl_idname.startswith("OCTO_MOTION_OT_")
-        for window in manager.windows
-        for operator in window.modal_operators
-        # Of one whose add-on was switched off meanwhile nothing is left.
-        if operator is not None
-    )
-
-
-def _armature(name: str) -> bpy.types.Object | None:
-    found = bpy.data.objects.get((name, None))
-    return found if found is not None and found.type == "ARMATURE" else None
-
-
-def _follow(name: str, *, certain: bool) -> None:
-    """Make an armature's motion anew, if it is not what it is made from says already."""
-    armature = _armature(name)
-    settings = locomotion_settings(armature) if armature is not None else None
-    if armature is None or settings is None or not settings.live:
-        _state.seen.pop(name, None)
-        return
-    if armature.mode == "EDIT" or not _within_scene(armature):
-        # Leaving edit mode is a change of its own.
-        return
-    now, rig = _read_from(armature, settings)
-    if _state.seen.get(name) != now:
-        _state.touched.setdefault(name, set()).add("ELSE")
-    elif not certain:
-        return
-    if _state.rigs.get(name) != rig:
-        _state.touched.setdefault(name, set()).update(_ANYTHING)
-        _state.rigs[name] = rig
-    with _telling(armature, settings), _deaf(), _window_of(armature):
-        _make(armature, settings)
-    if settings.live:
-        _state.seen[name] = now
-
-
-@contextmanager
-def _telling(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> Iterator[None]:
-    """Tell in the panel what goes wrong within; the motion stays as it was."""
-    try:
-        yield
-    except OctoMotionError as error:
-        _let_go(armature)
-        settings.live_error = translated(error)
-    except BaseException:
-        _let_go(armature)
-        settings.live = False
-        settings.live_error = translated("Live has stopped at a fault: the console tells which.")
-        raise
-
-
-def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> None:
-    """Show the frame in sight, and let the others follow."""
-    name, before = armature.name, None
-    earlier, known = _state.following.get(name), _state.known.pop(name, None)
-    touched = _state.touched.pop(name, set())
-    if known is not None:
-        before = Before(
-            known,
-            rig="RIG" not in touched and not settings.keep_pose,
-            ground="GROUND" not in touched,
-            all_else=not touched,
-        )
-    shown = earlier.motion if earlier is not None else None
-    motion = Following(armature, bpy.context, shown, before, _state.sketches.get(name))
-    _state.known[name] = replace(motion.shot)
-    _state.following[armature.name] = _Work(motion, Job(motion.steps()), motion.lines())
-    # Whose action it is that another frame shows again is looked at before it is written.
-    scene = bpy.context.scene
-    if scene is not None and _generated(armature, settings):
-        motion.show(armature, scene.frame_current_final)
-    _note_sketch(armature, motion)
-    assign(settings, "live_error", "")
-
-
-def _note_sketch(armature: bpy.types.Object, motion: Following) -> None:
-    if motion.sketch is not None:
-        _state.sketches[armature.name] = motion.sketch
-
-
-def _go_on(name: str, seconds: float) -> None:
-    """Work for so long on a motion that is on its way, and write it when it is there."""
-    armature, work = _armature(name), _state.following[name]
-    settings = locomotion_settings(armature) if armature is not None else None
-    if armature is None or settings is None or not settings.live:
-        _let_go(armature, name)
-        return
-    with _telling(armature, settings), _window_of(armature):
-        there, motion = work.job.work(seconds), work.motion
-        if motion is not None and motion.has_news:
-            with _deaf():
-                motion.tell(armature)
-            work.lines = motion.lines()
-            _note_sketch(armature, motion)
-        if there and _is_written(armature, settings, work):
-            with _deaf():
-                _write(armature, settings, motion)
-
-
-def _is_written(
-    armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion, work: _Work
-) -> bool:
-    """Whether all is there of a motion but what has to be written at once; if not, the action gets
-    what is to come before that, unless it is an artist's.
-    """
-    motion = work.motion
-    if motion is None or work.known:
-        return True
-    if kept := _whose(armature, settings, edited=motion.edited):
-        settings.live = False
-        settings.live_error = translated(kept)
-        _state.seen.pop(armature.name, None)
-        _let_go(armature)
-        return False
-    # While it plays, frames are shown as the action has them.
-    work.known = True
-    work.job = Job(iter(()) if _plays() else motion.filling(armature))
-    return False
-
-
-def _write(
-    armature: bpy.types.Object,
-    settings: OCTO_MOTION_PG_locomotion,
-    motion: Following | None,
-) -> None:
-    """Write a motion that was worked out; where Generate makes other keys of it, these follow."""
-    if motion is None:
-        del _state.following[armature.name]
-        return
-    if motion.shot.rig.detection is not None:
-        # What was found is what is set from now on.
-        _state.known.pop(armature.name, None)
-    motion.write()
-    _note_sketch(armature, motion)
-    # Markers of contacts are where the motion has them now.
-    _state.seen[armature.name] = _made_from(armature, settings)
-    if motion.exact:
-        del _state.following[armature.name]
-    else:
-        _state.following[armature.name] = _Work(None, Job(_exactly(armature)))
-
-
-def _exactly(armature: bpy.types.Object) -> Iterator[float]:
-    """What Generate does."""
-    shot = prepare(armature, bpy.context)
-    yield 0.0
-    yield from shot.compute(brief=True)
-    if not _whose(armature, locomotion_settings(armature)):
-        with _deaf():
-            shot.write(unedited=True)
-
-
-def _let_go(armature: bpy.types.Object | None, name: str = "") -> None:
-    """Leave a motion that was on its way, and show what is there."""
-    work = _state.following.pop(armature.name if armature is not None else name, None)
-    if work is not None and work.motion is not None and armature is not None:
-        with _deaf():
-            work.motion.give_back(armature)
-
-
-def _generated(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> bool:
-    """Whether the armature plays what was generated, or nothing."""
-    playing = playing_action(armature)
-    return playing is None or playing == previous_action(armature, settings)
-
-
-def _whose(
-    armature: bpy.types.Object,
-    settings: OCTO_MOTION_PG_locomotion,
-    *,
-    edited: bool | None = None,
-) -> str:
-    """Why the armature's action must be left alone, "" if it is ours; whether somebody has edited
-    it may be known already.
-    """
-    previous, playing = previous_action(armature, settings), playing_action(armature)
-    if playing is not None and playing != previous:
-        return phrase("Live is off: '{playing}' is not what was generated.", playing=playing.name)
-    if previous is None:
-        return ""
-    edited = is_edited(previous) if edited is None else edited
-    if not edited and belongs_to(previous, armature):
-        return ""
-    if edited:
-        return phrase("Live is off: '{previous}' was edited and is yours.", previous=previous.name)
-    return phrase("Live is off: '{previous}' has other users too.", previous=previous.name)
-
-
-def _made_from(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> str:
-    """All that a motion is made from and that belongs to the armature object itself, as text."""
-    return _read_from(armature, settings)[0]
 
 
 _OF_RIG: Final = frozenset(
@@ -839,34 +412,107 @@ def _read_from(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) 
     return json.dumps([asked, wishes, rig], sort_keys=True), json.dumps([known, rig])
 
 
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """Let nothing that happens within be a change to follow."""
-    _state.busy = True
-    try:
-        yield
-    finally:
-        try:
-            # What was written is told now, while nobody listens.
-            if bpy.context.view_layer is not None:
-                bpy.context.view_layer.update()
-        finally:
-            _state.busy = False
+# --- The motion ----------------------------------------------------------------------------------
 
 
-def _within_scene(armature: bpy.types.Object) -> bool:
-    return bool(_windows(armature)) or armature.name in bpy.context.view_layer.objects
+def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> None:
+    """Show the frame in sight, and let the others follow."""
+    name, before = armature.name, None
+    earlier, known = _state.following.get(name), _state.known.pop(name, None)
+    touched = _state.touched.pop(name, set())
+    if known is not None:
+        before = Before(
+            known,
+            rig="RIG" not in touched and not settings.keep_pose,
+            ground="GROUND" not in touched,
+            all_else=not touched,
+        )
+    shown = earlier.motion if earlier is not None else None
+    motion = Following(armature, bpy.context, shown, before, _state.sketches.get(name))
+    _state.known[name] = replace(motion.shot)
+    _state.following[armature.name] = _Work(motion, Job(motion.steps()), motion.lines())
+    # Whose action it is that another frame shows again is looked at before it is written.
+    scene = bpy.context.scene
+    if scene is not None and _generated(armature, settings):
+        motion.show(armature, scene.frame_current_final)
+    _note_sketch(armature, motion)
+    assign(settings, "live_error", "")
 
 
-def _windows(armature: bpy.types.Object) -> list[bpy.types.Window]:
-    """Windows that show a view layer with the armature."""
-    manager = bpy.context.window_manager
-    if manager is None:
-        return []
-    return [each for each in manager.windows if armature.name in each.view_layer.objects]
+def _note_sketch(armature: bpy.types.Object, motion: Following) -> None:
+    if motion.sketch is not None:
+        _state.sketches[armature.name] = motion.sketch
 
 
-def _window_of(armature: bpy.types.Object) -> AbstractContextManager[object]:
-    """A context in which the armature's scene is the one that is worked on."""
-    windows = _windows(armature)
-    return bpy.context.temp_override(window=windows[0]) if windows else nullcontext()
+def _is_written(
+    armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion, work: _Work
+) -> bool:
+    """Whether all is there of a motion but what has to be written at once; if not, the action gets
+    what is to come before that, unless it is an artist's.
+    """
+    motion = work.motion
+    if motion is None or work.known:
+        return True
+    if kept := _whose(armature, settings, edited=motion.edited):
+        _state.switch_off(armature, kept)
+        return False
+    # While it plays, frames are shown as the action has them.
+    work.known = True
+    work.job = Job(iter(()) if plays() else motion.filling(armature))
+    return False
+
+
+def _write(armature: bpy.types.Object, motion: Following | None) -> None:
+    """Write a motion that was worked out; where Generate makes other keys of it, these follow."""
+    if motion is None:
+        del _state.following[armature.name]
+        return
+    if motion.shot.rig.detection is not None:
+        # What was found is what is set from now on.
+        _state.known.pop(armature.name, None)
+    motion.write()
+    _note_sketch(armature, motion)
+    # Markers of contacts are where the motion has them now.
+    _state.seen[armature.name] = _state.made_from(armature)
+    if motion.exact:
+        del _state.following[armature.name]
+    else:
+        _state.following[armature.name] = _Work(None, Job(_exactly(armature)))
+
+
+def _exactly(armature: bpy.types.Object) -> Iterator[float]:
+    """What Generate does."""
+    shot = prepare(armature, bpy.context)
+    yield 0.0
+    yield from shot.compute(brief=True)
+    if not _whose(armature, locomotion_settings(armature)):
+        with _state.deaf():
+            shot.write(unedited=True)
+
+
+def _generated(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> bool:
+    """Whether the armature plays what was generated, or nothing."""
+    playing = playing_action(armature)
+    return playing is None or playing == previous_action(armature, settings)
+
+
+def _whose(
+    armature: bpy.types.Object,
+    settings: OCTO_MOTION_PG_locomotion,
+    *,
+    edited: bool | None = None,
+) -> str:
+    """Why the armature's action must be left alone, "" if it is ours; whether somebody has edited
+    it may be known already.
+    """
+    previous, playing = previous_action(armature, settings), playing_action(armature)
+    if playing is not None and playing != previous:
+        return phrase("Live is off: '{playing}' is not what was generated.", playing=playing.name)
+    if previous is None:
+        return ""
+    edited = is_edited(previous) if edited is None else edited
+    if not edited and belongs_to(previous, armature):
+        return ""
+    if edited:
+        return phrase("Live is off: '{previous}' was edited and is yours.", previous=previous.name)
+    return phrase("Live is off: '{previous}' has other users too.", previous=previous.name)

@@ -37,7 +37,6 @@ from .lists import (
 from .properties import (
     KIND_NAMES,
     KINDS,
-    SWITCHED,
     OCTO_MOTION_PG_locomotion,
     fill_gait_table,
     known_figures,
@@ -58,7 +57,6 @@ __all__ = [
     "MODES",
     "SETTINGS_ALONG",
     "SIDES",
-    "SWITCHED",
     "AlongItem",
     "ChangeItem",
     "ContactEdit",

@@ -23,6 +23,7 @@ from ....core.locomotion.path import TravelSettings
 from ....core.phrases import phrase
 from ... import declared_settings as props
 from ...declared_settings import declared, emptied, make_overridable
+from ...live import tell_switched
 from .body import OCTO_MOTION_PG_body
 from .gait import (
     DEFAULT_GAIT,
@@ -380,16 +381,6 @@ class Timing:
     )
 
 
-SWITCHED: Final[set[str]] = set()
-"""Names of the armatures whose Live was switched, until somebody has looked."""
-
-
-def _tell(settings: Any, _context: bpy.types.Context) -> None:
-    """A change in the panel is told to everyone by Blender, one by a script only like this."""
-    SWITCHED.add(settings.id_data.name)
-    settings.id_data.update_tag(refresh={"OBJECT"})
-
-
 class Outcome:
     """What ``Object.octo_motion.locomotion`` has of what is made: keys, quality, live."""
 
@@ -484,7 +475,7 @@ class Outcome:
         description="Make the motion anew by itself whenever its route, its ground or a setting "
         "changes: the frame in sight at once, all others while Blender idles. Generate measures "
         "it. Switches itself off when you edit the action",
-        update=_tell,
+        update=tell_switched,
     )
     live_error: props.StringProperty(
         name="Live Error",
