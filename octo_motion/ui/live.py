@@ -45,12 +45,8 @@ def tell_switched(settings: Any, _context: bpy.types.Context) -> None:
     settings.id_data.update_tag(refresh={"OBJECT"})
 
 
-class Live:
-    """Motions of one kind that follow what they are made from.
-
-    Write ``settings``, ``sources``, ``made_from``, ``make``, ``work_on``, ``show`` and
-    ``give_back``. Armatures are known by name: references to Blender's data do not outlive a turn.
-    """
+class _Following:
+    """Motions of one kind on their way, in turns; see :class:`Live`."""
 
     def __init__(self) -> None:
         self.seen: dict[str, str | None] = {}
@@ -69,7 +65,6 @@ class Live:
         # Blender knows timers by their objects: a method is another one each time.
         self.run_pending: Callable[[], float | None] = self._run_pending
         self.run_following: Callable[[], float | None] = self._run_following
-        _all.append(self)
 
     # --- What a kind of motion is ---
 
@@ -137,38 +132,6 @@ class Live:
         stop_timer(self.run_pending)
         stop_timer(self.run_following)
 
-    # --- Beginning and end ---
-
-    def listen(self) -> None:
-        """Listen to Blender."""
-        for handlers, function in self._handlers():
-            handlers.append(function)
-
-    def listen_no_more(self) -> None:
-        """Listen no more, and drop what was about to be made."""
-        for name in list(self.following):
-            self.let_go(armature_named(name), name)
-        self.drop()
-        self.clear()
-        for handlers, function in self._handlers():
-            if function in handlers:
-                handlers.remove(function)
-
-    def _handlers(self) -> list[tuple[Any, Any]]:
-        known = bpy.app.handlers
-        return [
-            (known.depsgraph_update_post, self.after_update),
-            (known.frame_change_post, self.after_frame),
-            (known.undo_pre, self._before_undo),
-            (known.redo_pre, self._before_undo),
-            (known.undo_post, self._after_undo),
-            (known.redo_post, self._after_undo),
-            (known.save_pre, self._before_saving),
-            (known.load_pre, self._before_loading),
-            (known.load_post, self._after_loading),
-            (known.blend_import_post, self._after_import),
-        ]
-
     def made(self, armature: bpy.types.Object) -> None:
         """Tell that an armature's motion has just been made from its settings as they are."""
         settings = self.settings(armature)
@@ -176,6 +139,15 @@ class Live:
             self.seen[armature.name] = self.made_from(armature)
         self.following.pop(armature.name, None)
         assign(settings, "live_error", "")
+
+    def is_on(self, armature: bpy.types.Object) -> bool:
+        """Whether an armature is to be followed."""
+        # Settings come into being when they are looked at: what has none is left without.
+        return (
+            armature.library is None
+            and armature.is_property_set("octo_motion")
+            and self.settings(armature).live
+        )
 
     # --- The two timers ---
 
@@ -299,7 +271,47 @@ class Live:
             finally:
                 self.busy = False
 
-    # --- What Blender tells ---
+
+class Live(_Following):
+    """Motions of one kind that follow what they are made from, as Blender tells of it.
+
+    Write ``settings``, ``sources``, ``made_from``, ``make``, ``work_on``, ``show`` and
+    ``give_back``. Armatures are known by name: references to Blender's data do not outlive a turn.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        _all.append(self)
+
+    def listen(self) -> None:
+        """Listen to Blender."""
+        for handlers, function in self._handlers():
+            handlers.append(function)
+
+    def listen_no_more(self) -> None:
+        """Listen no more, and drop what was about to be made."""
+        for name in list(self.following):
+            self.let_go(armature_named(name), name)
+        self.drop()
+        self.clear()
+        for handlers, function in self._handlers():
+            if function in handlers:
+                handlers.remove(function)
+
+    def _handlers(self) -> list[tuple[Any, Any]]:
+        known = bpy.app.handlers
+        return [
+            (known.depsgraph_update_post, self.after_update),
+            (known.frame_change_post, self.after_frame),
+            (known.undo_pre, self._before_undo),
+            (known.redo_pre, self._before_undo),
+            (known.undo_post, self._after_undo),
+            (known.redo_post, self._after_undo),
+            (known.save_pre, self._before_saving),
+            (known.load_pre, self._before_loading),
+            (known.load_post, self._after_loading),
+            (known.blend_import_post, self._after_import),
+        ]
 
     @persistent
     def after_update(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
@@ -378,15 +390,6 @@ class Live:
         else:
             self.seen[name] = None
             self.soon(name, certain=True)
-
-    def is_on(self, armature: bpy.types.Object) -> bool:
-        """Whether an armature is to be followed."""
-        # Settings come into being when they are looked at: what has none is left without.
-        return (
-            armature.library is None
-            and armature.is_property_set("octo_motion")
-            and self.settings(armature).live
-        )
 
     def live_armatures(self) -> list[bpy.types.Object]:
         """All that are to be followed."""
