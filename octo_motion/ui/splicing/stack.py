@@ -8,7 +8,7 @@ computes on plain arrays alone; :func:`write_splices` changes the file.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Final, cast
@@ -46,6 +46,7 @@ from ...core.splicing.transfer import (
     CHAIN,
     LimbGoal,
     MappedClip,
+    Matches,
     Part,
     Reference,
     SeenFrom,
@@ -53,7 +54,7 @@ from ...core.splicing.transfer import (
     SpliceError,
     SplicePreview,
     Suggestion,
-    build_splices,
+    building_splices,
     chain_part,
     numbered,
     opposite_part,
@@ -61,6 +62,7 @@ from ...core.splicing.transfer import (
     part_named,
     suggest_timings,
 )
+from ...core.steps import finished
 from ..declared_settings import plain
 from .bodies import known_landmarks
 from .mesh_ground import mesh_ground
@@ -136,7 +138,11 @@ class Stack:
         return [splice for splice in self.splices if splice is not None]
 
     def compute(self) -> SplicedMotion:
-        """The result beside the base.
+        """What :meth:`computing` comes to."""
+        return finished(self.computing())
+
+    def computing(self) -> Generator[None, None, SplicedMotion]:
+        """The result beside the base, in steps.
 
         Raises:
             ListedSpliceError: a bone or landmark is missing, or a timing makes no sense.
@@ -146,11 +152,11 @@ class Stack:
         anew = None
         with self.naming():
             if self.finer is None or self.anew:
-                anew = build_splices(base, marks, self.acting)
+                anew = yield from building_splices(base, marks, self.acting)
             if self.finer is None:
                 assert anew is not None
                 return SplicedMotion(base, anew, first, last, anew, base.skeleton.names)
-            result = build_splices(base, marks, self.acting, self.finer)
+            result = yield from building_splices(base, marks, self.acting, self.finer)
         return SplicedMotion(self.finer, result, first, last, anew, self.anew)
 
     def preview(self, number: int) -> SplicePreview:

@@ -15,19 +15,36 @@ from .parts import (
 )
 from .reference_pose import ReferencePose, find_reference_pose, reference_doubts
 from .retarget import MappedClip
-from .splice import LimbGoal, Reference, Splice, SpliceError, SplicePreview, build_splices, numbered
+from .splice import (
+    LimbGoal,
+    Matches,
+    Reference,
+    Splice,
+    SpliceError,
+    SplicePreview,
+    building_splices,
+    numbered,
+)
 from .timing_suggestions import Suggestion, suggest_timings
-from .whole_body import WholeBody, rests_standing, retarget_clip
+from .whole_body import (
+    RetargetPreview,
+    WholeBody,
+    rests_standing,
+    retarget_clip,
+    retargeting_clip,
+)
 
 __all__ = [
     "CHAIN",
     "PART_TABLE",
     "LimbGoal",
     "MappedClip",
+    "Matches",
     "Part",
     "PartKind",
     "Reference",
     "ReferencePose",
+    "RetargetPreview",
     "SeenFrom",
     "Splice",
     "SpliceError",
@@ -35,7 +52,7 @@ __all__ = [
     "Suggestion",
     "WholeBody",
     "bones_beneath",
-    "build_splices",
+    "building_splices",
     "chain_part",
     "find_reference_pose",
     "numbered",
@@ -45,5 +62,6 @@ __all__ = [
     "reference_doubts",
     "rests_standing",
     "retarget_clip",
+    "retargeting_clip",
     "suggest_timings",
 ]

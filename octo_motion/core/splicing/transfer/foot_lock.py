@@ -11,6 +11,7 @@ worked out at once.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
@@ -29,6 +30,7 @@ from ...rotations import (
     to_rotation_vector,
 )
 from ...smoothing import blur_reach, blurred, covered, widened
+from ...steps import finished
 from ..clip import Clip, Posture, posture_of, sample_world
 from .foot_contacts import (
     ANKLE,
@@ -150,7 +152,14 @@ def steps_of(paths: FootPaths, contacts: FootContacts, stance: Stance, size: flo
 def lock_feet(
     mapped: MappedClip, clip: Clip, footing: Footing, weights: Floats | None = None
 ) -> Clip:
-    """A clip whose feet stand while they are said to.
+    """What :func:`locking_feet` comes to."""
+    return finished(locking_feet(mapped, clip, footing, weights))
+
+
+def locking_feet(
+    mapped: MappedClip, clip: Clip, footing: Footing, weights: Floats | None = None
+) -> Generator[None, None, Clip]:
+    """A clip whose feet stand while they are said to, in steps.
 
     Args:
         mapped: says which bones of the clip's skeleton are which.
@@ -169,11 +178,17 @@ def lock_feet(
     rounds = Rounds.between(paths.hips) if footing.cyclic else None
     share = np.ones(len(clip)) if weights is None else weights
     share = (share if rounds is None else repeated(share))[:, None]
+    yield
     moved = _Legs(mapped, posture, clip, rounds)
     balls = ball_places(mapped) if footing.balls is None else footing.balls
-    legs = [_leg(moved, footing, balls[side], paths.rate, side) for side in range(2)]
+    legs: list[_Leg] = []
+    for side in range(2):
+        legs.append(_leg(moved, footing, balls[side], paths.rate, side))
+        yield
     carried = _carried(legs, paths.rate)
+    yield
     legs = [_brought(leg, carried, share, paths.rate) for leg in legs]
+    yield
     carried = share * (carried - _lowered(legs, share * carried, paths.rate)[:, None] * _UP)
     if rounds is not None:
         own = own_round(len(clip))

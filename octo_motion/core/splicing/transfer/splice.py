@@ -10,11 +10,11 @@ the exact point; clavicles may belong to the arm.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from ...rotations import (
     multiply,
     to_rotation_vector,
 )
+from ...steps import finished
 from ..clip import (
     Clip,
     Posture,
@@ -60,6 +61,10 @@ LimbGoal = Literal["direction", "exact"]
 
 Reference = Literal["first", "rest"] | float
 """Of a clip: its first frame, its rest pose (or the reference pose that was found), or a frame."""
+
+
+Matches = dict[Any, tuple[list[Retarget], tuple[Clip, Clip]]]
+"""How parts go onto each other, and the clips that they are of, by all that was asked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +100,8 @@ class Splice:
     mirror: bool = False
     """Whether the clip is seen in a mirror: its right arm is then the part's left one. Of a chain
     the mirror image is taken, unless its bone on the splice clip is named."""
+    matches: Matches = field(default_factory=dict[Any, Any])
+    """What :meth:`retargets` has found; splices may share it."""
 
     @cached_property
     def mapped(self) -> MappedClip:
@@ -118,16 +125,25 @@ class Splice:
         Raises:
             ClipError: a bone or landmark is missing.
         """
-        splice = self.mapped
-        if self.part.kind is not None:
-            base, splice = compared(whole_limbs(base)[0], whole_limbs(splice)[0])
-        return find_retargets(
-            self._part,
-            base,
-            splice,
-            clavicle=self.clavicle,
-            seen_from="pelvis" if self.travel else self.seen_from,
-        )
+        seen_from: SeenFrom = "pelvis" if self.travel else self.seen_from
+        told = [_told(each) for each in (base.landmarks, self.landmarks)]
+        asked = self.part, self.mirror, self.clavicle, seen_from
+        known = id(base.clip), id(self.clip), *told, *asked
+        if known not in self.matches:
+            ours, theirs = base, self.mapped
+            if self.part.kind is not None:
+                ours, theirs = compared(whole_limbs(base)[0], whole_limbs(theirs)[0])
+            found = find_retargets(
+                self._part, ours, theirs, clavicle=self.clavicle, seen_from=seen_from
+            )
+            # As long as the clips are kept no others are taken for them.
+            self.matches[known] = found, (base.clip, self.clip)
+        return self.matches[known][0]
+
+
+def _told(landmarks: Landmarks | None) -> Any:
+    """Landmarks such that they can be looked up."""
+    return landmarks and (tuple(sorted(landmarks.bones.items())), landmarks.reference)
 
 
 class SpliceError(ClipError):
@@ -151,7 +167,15 @@ def numbered(number: int) -> Iterator[None]:
 def build_splices(
     base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice], finer: Clip | None = None
 ) -> Clip:
-    """All splices of a stack, each onto the result of those before. Nothing given is changed.
+    """What :func:`building_splices` comes to."""
+    return finished(building_splices(base, landmarks, splices, finer))
+
+
+def building_splices(
+    base: Clip, landmarks: Landmarks | None, splices: Sequence[Splice], finer: Clip | None = None
+) -> Generator[None, None, Clip]:
+    """All splices of a stack, each onto the result of those before, in steps. Nothing given is
+    changed.
 
     Args:
         base: what they go onto.
@@ -164,11 +188,15 @@ def build_splices(
         SpliceError: a bone or landmark is missing, or a timing makes no sense.
     """
     # All on the same base: the ground is where it stands, whatever is done to its legs on the way.
-    ready = _made_ready(base, landmarks, splices)
+    ready: list[Splicer] = []
+    for number in range(len(splices)):
+        ready += _made_ready(base, landmarks, splices[number : number + 1], number)
+        yield
     result = base if finer is None else finer
     for number, each in enumerate(ready):
         with numbered(number):
-            result = each.onto(result, each.window(each.splice.timing, result.frames))
+            result = yield from each.onto(result, each.window(each.splice.timing, result.frames))
+        yield
     return result
 
 
@@ -245,25 +273,28 @@ class Splicer:
             needed |= {span.frames.start, span.frames.stop - 1} if len(span.weights) else set()
         return sorted(needed)
 
-    def onto(self, base: Clip, span: SpliceWindow) -> Clip:
+    def onto(self, base: Clip, span: SpliceWindow) -> Generator[None, None, Clip]:
         """Put the part onto a clip of the base's skeleton, or onto those of its frames that are
-        :meth:`needed`; the span says when it acts on these.
+        :meth:`needed`, in steps; the span says when it acts on these.
         """
         if span.frames.stop == span.frames.start:
             return base
         if self._hung is None:
-            return self._onto_limbs(base, span)
+            return (yield from self._onto_limbs(base, span))
         before = self._hung.into(base)
-        return self._hung.back(self._onto_limbs(before, span), before, base)
+        result = yield from self._onto_limbs(before, span)
+        return self._hung.back(result, before, base)
 
-    def _onto_limbs(self, base: Clip, span: SpliceWindow) -> Clip:
+    def _onto_limbs(self, base: Clip, span: SpliceWindow) -> Generator[None, None, Clip]:
         """The same, of a clip whose limbs are whole."""
         if self._rests is None:
-            return self._onto(base, span)
+            return (yield from self._onto(base, span))
         before = self._rests.into(base)
-        return self._rests.back(self._onto(before, span), before, base)
+        yield
+        result = yield from self._onto(before, span)
+        return self._rests.back(result, before, base)
 
-    def _onto(self, base: Clip, span: SpliceWindow) -> Clip:
+    def _onto(self, base: Clip, span: SpliceWindow) -> Generator[None, None, Clip]:
         """The same, of a clip that rests as the base does where the two were compared."""
         rotations, locations = base.rotations.copy(), base.locations.copy()
         before = posture_of(base.skeleton, base.rotations[span.frames], base.locations[span.frames])
@@ -273,17 +304,20 @@ class Splicer:
         exact = self.splice.goal == "exact"
         for each in self._retargets:
             write_retargeted(each, before, moment, turned, moved, exact=exact)
+            yield
         if self.splice.additive:
             self._add(base, span, before, turned, moved)
+            yield
         if (span.weights < 1.0).any():
             _ease(base, span, self._bones, turned, moved)
+            yield
         if self._travel is not None:
             whole = posture_of(base.skeleton, base.rotations, base.locations)
             self._travel.move(base, span, whole, rotations, locations)
+            yield
         scales = self._scaled(base, span)
         result = replace(base, rotations=rotations, locations=locations, scales=scales)
-        lock = self._lock
-        return result if lock is None else lock.onto(result, span)
+        return result if self._lock is None else (yield from self._lock.onto(result, span))
 
     def _add(
         self, base: Clip, span: SpliceWindow, before: Posture, turned: Floats, moved: Floats
@@ -425,5 +459,5 @@ class SplicePreview:
         result = self._base.taken(rows)
         for number, (level, span) in enumerate(zip(self._levels, spans, strict=True), self._number):
             with numbered(number):
-                result = level.onto(result, span.taken(rows))
+                result = finished(level.onto(result, span.taken(rows)))
         return result.taken([needed.index(row)])

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -20,7 +20,7 @@ from .foot_contacts import (
     foot_bones,
     own_paths,
 )
-from .foot_lock import Footing, GroundHeight, lock_feet, steps_of
+from .foot_lock import Footing, GroundHeight, locking_feet, steps_of
 from .leg_travel import leg_length
 from .retarget import MappedClip, Retarget
 
@@ -75,8 +75,8 @@ class TravelLock:
         self._steps = steps_of(paths, contacts, find_stance(paths), ratio)
         self._frames = splice.clip.frames
 
-    def onto(self, result: Clip, span: SpliceWindow) -> Clip:
-        """The result of a splice with its feet held where the splice acts.
+    def onto(self, result: Clip, span: SpliceWindow) -> Generator[None, None, Clip]:
+        """The result of a splice with its feet held where the splice acts, in steps.
 
         Whole frames are what they are without moments between them; those follow.
         """
@@ -85,12 +85,15 @@ class TravelLock:
         whole = np.isin(np.round(result.frames[acting], _DIGITS), own)
         held = result
         if whole.any():
-            held = self._held(result, acting[whole], span.taken(acting[whole]))
+            held = yield from self._held(result, acting[whole], span.taken(acting[whole]))
         if whole.all():
             return held
-        return _followed(held, self._held(result, acting, span), acting[whole], acting[~whole])
+        finer = yield from self._held(result, acting, span)
+        return _followed(held, finer, acting[whole], acting[~whole])
 
-    def _held(self, result: Clip, acting: np.ndarray, span: SpliceWindow) -> Clip:
+    def _held(
+        self, result: Clip, acting: np.ndarray, span: SpliceWindow
+    ) -> Generator[None, None, Clip]:
         """The same from row to row of those on which a splice acts, all others as they are.
 
         Of its frames some may be missing: what lies between gaps is looked at by itself.
@@ -111,7 +114,9 @@ class TravelLock:
                 self._balls,
             )
             there = acting[chosen]
-            locked = lock_feet(self._base, result.taken(there), footing, span.weights[chosen])
+            locked = yield from locking_feet(
+                self._base, result.taken(there), footing, span.weights[chosen]
+            )
             rotations[there], locations[there] = locked.rotations, locked.locations
         return replace(result, rotations=rotations, locations=locations)
 

@@ -9,6 +9,7 @@ before and behind, so that it stays one.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -24,15 +25,17 @@ from ...rotations import (
 )
 from ...skeleton import Skeleton
 from ...smoothing import blurred
-from ..clip import Clip, posture_of, sample_clip
+from ...steps import finished
+from ..clip import Clip, Reresting, posture_of, sample_clip
 from ..humanoid import Landmarks, chain_length
 from .foot_contacts import (
+    FootContacts,
     find_contacts,
     find_stance,
     foot_paths,
     own_paths,
 )
-from .foot_lock import Footing, GroundHeight, lock_feet, steps_of
+from .foot_lock import Footing, GroundHeight, locking_feet, steps_of
 from .leg_travel import (
     BodyPath,
     body_path,
@@ -42,7 +45,7 @@ from .leg_travel import (
 )
 from .loop_rounds import Rounds, is_loop
 from .parts import LEG, PARTS
-from .rehung import whole_limbs
+from .rehung import Rehung, whole_limbs
 from .retarget import (
     MappedClip,
     ReferredClip,
@@ -52,7 +55,7 @@ from .retarget import (
     write_retargeted,
 )
 from .splice import LimbGoal
-from .travel_lock import above_soles, answering_balls, size_ratio
+from .travel_lock import SIGHT, above_soles, answering_balls, size_ratio
 
 _PARTS: Final = ("legs", "trunk", "left_arm", "right_arm", "head")
 """In the order in which they are put on: each hangs on those before it."""
@@ -92,7 +95,19 @@ def retarget_clip(
     settings: WholeBody | None = None,
     standing: MappedClip | None = None,
 ) -> Clip:
-    """A whole clip on another body, over all frames of a clip of that body that does nothing.
+    """What :func:`retargeting_clip` comes to."""
+    return finished(retargeting_clip(base, still, source, settings, standing))
+
+
+def retargeting_clip(
+    base: MappedClip,
+    still: Clip,
+    source: MappedClip,
+    settings: WholeBody | None = None,
+    standing: MappedClip | None = None,
+) -> Generator[None, None, Clip]:
+    """A whole clip on another body, over all frames of a clip of that body that does nothing, in
+    steps.
 
     Args:
         base: a clip of the body that gets it, by which the two are compared; it may be the same as
@@ -106,14 +121,102 @@ def retarget_clip(
     Raises:
         ClipError: a landmark is missing, or the hips cannot leave their parent.
     """
-    settings = settings or WholeBody()
+    pair = yield from _pairing(base, still, source, standing)
+    return (yield from pair.moving(settings or WholeBody()))
+
+
+class RetargetPreview:
+    """A whole clip on another body at single frames, while it is set how: nearly so, as feet look
+    no further than a little way to either side.
+
+    Args as of :func:`retargeting_clip`.
+
+    Raises:
+        ClipError: a landmark is missing, or the hips cannot leave their parent.
+    """
+
+    def __init__(
+        self, base: MappedClip, still: Clip, source: MappedClip, standing: MappedClip | None = None
+    ) -> None:
+        self._frames = still.frames
+        self._pair = finished(_pairing(base, still, source, standing))
+
+    def at(self, frame: float, settings: WholeBody) -> Clip:
+        """The frame nearest to this one, in a clip that has no other.
+
+        Raises:
+            ClipError: the hips cannot leave their parent.
+            GroundError: it leaves the ground.
+        """
+        row = int(np.abs(self._frames - frame).argmin())
+        sight = round(SIGHT * self._pair.still.rate)
+        first, last = max(row - sight, 0), min(row + sight, len(self._frames) - 1)
+        rows = np.arange(first, last + 1)
+        result = finished(self._pair.moving(settings, rows))
+        return result.taken([row - first])
+
+
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """Two bodies in the poses in which they are compared, and all that does not hang on how the one
+    gets the other's clip.
+    """
+
+    base: MappedClip
+    source: MappedClip
+    retargets: list[Retarget]
+    stands: MappedClip
+    still: Clip
+    """The body as it is, that does nothing, …"""
+    joined: Clip
+    """… with its limbs whole, …"""
+    at_rest: Clip
+    """… with its reference pose as its rest pose, …"""
+    before: Clip
+    """… and with what carries its limbs in place."""
+    hung: Rehung | None
+    rests: Reresting | None
+
+    def moving(
+        self, settings: WholeBody, rows: np.ndarray | None = None
+    ) -> Generator[None, None, Clip]:
+        """The clip on the body, at all frames or at some of them (rows,), in steps."""
+
+        def some(clip: Clip) -> Clip:
+            return clip if rows is None else clip.taken(rows)
+
+        mover = _Mover(self, settings, rows)
+        yield
+        result = yield from mover.onto(some(self.before))
+        if self.rests is not None:
+            result = self.rests.back(result, some(self.at_rest), some(self.joined))
+            yield
+        if self.hung is not None:
+            result = self.hung.back(result, some(self.joined), some(self.still))
+        return result
+
+
+def _pairing(
+    base: MappedClip, still: Clip, source: MappedClip, standing: MappedClip | None
+) -> Generator[None, None, _Pair]:
     assert len(still) == len(source.clip)
-    joined, hung = whole_limbs(base)
+    whole, hung = whole_limbs(base)
     source, _ = whole_limbs(source)
-    before = still if hung is None else hung.into(still)
-    stands = whole_limbs(standing)[0] if standing is not None else joined
-    result = _on_whole_limbs(joined, before, source, settings, stands)
-    return result if hung is None else hung.back(result, before, still)
+    joined = still if hung is None else hung.into(still)
+    stands = whole_limbs(standing)[0] if standing is not None else whole
+    yield
+    ours, theirs = compared(whole, source)
+    rests = ours.rests if isinstance(ours, ReferredClip) else None
+    at_rest = before = joined if rests is None else rests.into(joined)
+    yield
+    retargets: list[Retarget] = []
+    for name in _PARTS:
+        seen_from = "pelvis" if name == "legs" else ""
+        retargets += find_retargets(PARTS[name], ours, theirs, clavicle=True, seen_from=seen_from)
+        yield
+    if rests is not None and not rests_standing(whole.skeleton, whole.landmarks):
+        before = _with_carriers_in_place(before, ours, retargets)
+    return _Pair(ours, theirs, retargets, stands, still, joined, at_rest, before, hung, rests)
 
 
 def rests_standing(skeleton: Skeleton, landmarks: Landmarks | None) -> bool:
@@ -140,26 +243,6 @@ def rests_standing(skeleton: Skeleton, landmarks: Landmarks | None) -> bool:
     return True
 
 
-def _on_whole_limbs(
-    base: MappedClip, still: Clip, source: MappedClip, settings: WholeBody, stands: MappedClip
-) -> Clip:
-    ours, theirs = compared(base, source)
-    rests = ours.rests if isinstance(ours, ReferredClip) else None
-    at_rest = before = still if rests is None else rests.into(still)
-    retargets = [
-        each
-        for name in _PARTS
-        for each in find_retargets(
-            PARTS[name], ours, theirs, clavicle=True, seen_from="pelvis" if name == "legs" else ""
-        )
-    ]
-    if rests is not None and not rests_standing(base.skeleton, base.landmarks):
-        before = _with_carriers_in_place(before, ours, retargets)
-    mover = _Mover((ours, theirs), retargets, settings, stands)
-    result = mover.onto(before)
-    return result if rests is None else rests.back(result, at_rest, still)
-
-
 def _with_carriers_in_place(still: Clip, body: MappedClip, retargets: list[Retarget]) -> Clip:
     """A body that does nothing, with bones that carry limbs and that no part takes as they are in
     the reference pose: where a file's rest pose is none of a body, they would put limbs anywhere.
@@ -176,32 +259,29 @@ def _with_carriers_in_place(still: Clip, body: MappedClip, retargets: list[Retar
 
 
 class _Mover:
-    """Puts a whole clip onto a body; both rest in the poses in which they are compared."""
+    """Puts a whole clip, or some rows of it, onto a body."""
 
-    def __init__(
-        self,
-        clips: tuple[MappedClip, MappedClip],
-        retargets: list[Retarget],
-        settings: WholeBody,
-        stands: MappedClip,
-    ) -> None:
-        base, source = clips
-        self._base, self._source = base, source
+    def __init__(self, pair: _Pair, settings: WholeBody, rows: np.ndarray | None) -> None:
+        base, source, retargets = pair.base, pair.source, pair.retargets
+        self._base, self._source, self._rows = base, source, rows
         self._retargets = retargets
         self._settings = settings
         self._ratio = size_ratio(retargets[0])
-        clip = source.clip
-        self._moment = sample_clip(clip, clip.frames)
-        self._paths = foot_paths(source, self._moment, clip.frames)
+        self._still = pair.before
+        frames = source.clip.frames
+        self._frames = frames if rows is None else frames[rows]
+        self._moment = sample_clip(source.clip, self._frames)
+        whole = self._moment if rows is None else sample_clip(source.clip, frames)
+        self._paths = foot_paths(source, whole, frames)
         self._balls = answering_balls(retargets[:2], "LR")
-        self._stands = find_stance(own_paths(stands, self._balls))
+        self._stands = find_stance(own_paths(pair.stands, self._balls))
         if settings.ground is not None:
             self._stands = above_soles(self._stands, base)
         self._width = max(1, round(_FOLLOWED * self._paths.rate))
         check_hips(base.skeleton, retargets[0].frames[0].bone)
 
-    def onto(self, before: Clip) -> Clip:
-        """The whole, on frames of a body that does nothing."""
+    def onto(self, before: Clip) -> Generator[None, None, Clip]:
+        """The whole, on frames of a body that does nothing, in steps."""
         rotations, locations = before.rotations.copy(), before.locations.copy()
         skeleton = before.skeleton
         exact = self._settings.goal == "exact"
@@ -209,21 +289,23 @@ class _Mover:
             posture = posture_of(skeleton, rotations, locations)
             reaches = exact and each.limb is not None
             write_retargeted(each, posture, self._moment, rotations, locations, exact=reaches)
+            yield
             if number == 1:
                 # Both legs are on: what follows hangs on the pelvis.
                 self._travel(before, rotations, locations)
+                yield
         result = replace(before, rotations=rotations, locations=locations)
         if not (self._settings.travel and self._settings.foot_lock):
             return result
-        return self._standing(result)
+        return (yield from self._standing(result))
 
     def _travel(self, before: Clip, rotations: Floats, locations: Floats) -> None:
         """The pelvis's way, at the body's own size, from where its object stands."""
         ours, theirs = self._retargets[0].frames
         clip = self._source.clip
-        path = body_path(clip, theirs, self._moment, clip.frames)
-        turn = heading(_object_turn(before), _object_turn(clip))
-        start = before.world[0, :3, 3] * _LEVEL
+        path = body_path(clip, theirs, self._moment, self._frames)
+        turn = heading(_object_turn(self._still), _object_turn(clip))
+        start = self._still.world[0, :3, 3] * _LEVEL
         way = path.places - clip.world[0, :3, 3] * _LEVEL
         if not self._settings.travel:
             way = np.where(_LEVEL > 0.0, 0.0, way)
@@ -246,18 +328,23 @@ class _Mover:
             return np.full(len(places), self._stands.ankle)
         return self._stands.ankle + blurred(ground.height(places), self._width)
 
-    def _standing(self, result: Clip) -> Clip:
-        """With feet that stand."""
+    def _standing(self, result: Clip) -> Generator[None, None, Clip]:
+        """With feet that stand, in steps."""
         paths = self._paths
         loops = is_loop(self._source, paths)
         if loops:
             paths = replace(paths, points=Rounds.between(paths.hips).points(paths.points))
         contacts = find_contacts(paths)
+        yield
         steps = steps_of(paths, contacts, find_stance(paths), self._ratio)
+        yield
+        if self._rows is not None:
+            own = self._rows + (len(self._source.clip) - 1 if loops else 0)
+            contacts, steps, loops = FootContacts(contacts.held[own]), steps[own], False
         footing = Footing(
             contacts, self._stands, steps, self._settings.ground, self._balls, cyclic=loops
         )
-        return lock_feet(self._base, result, footing)
+        return (yield from locking_feet(self._base, result, footing))
 
 
 def _object_turn(clip: Clip) -> Floats:
