@@ -65,6 +65,14 @@ def lines_of(text: str, characters: int) -> list[str]:
     return [line.rstrip() for line in lines]
 
 
+def draw_live_error(layout: Any, settings: Any) -> None:
+    """Why what is live does not follow at the moment, if that is so."""
+    if settings.live_error:
+        row = layout.row()
+        row.alert = True
+        draw_sentence(row, bpy.context, settings.live_error, "ERROR")
+
+
 def draw_list(
     layout: Any,
     row_type: type,

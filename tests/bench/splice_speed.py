@@ -191,7 +191,12 @@ def _run(frames: int) -> Result:
             (stack.Splice, "retargets"),
         ],
         "compute": [(stack.Stack, "compute")],
-        "keys of what is changed": [(spliced_action, "_changed"), (spliced_action, "stretch_keys")],
+        "keys of what is changed": [
+            (spliced_action._Changes, "differing"),
+            (spliced_action._Changes, "rotation"),
+            (spliced_action._Changes, "vector"),
+            (spliced_action, "stretch_keys"),
+        ],
         "write keys": [
             (spliced_action, "copy_curve"),
             (spliced_action, "write_stretches"),

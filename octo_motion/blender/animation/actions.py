@@ -200,9 +200,10 @@ def write_action(
     action.use_frame_range = True
     action.frame_start, action.frame_end = float(times[0]), float(times[-1])
     if not beneath:
-        _assign(obj, action)
+        assign_action(obj, action)
     tracks = _tracks_of(action)
-    _mark(action, obj, settings_note, digests, handles)
+    fingerprint = deque(_fingerprint(action, digests), maxlen=1).pop()
+    _mark(action, obj.name, settings_note, fingerprint, handles)
     action[MARK]["frames"] = len(times)
     for key, track in tracks.items():
         action[MARK][key] = track
@@ -237,19 +238,34 @@ def assign_generated(obj: bpy.types.Object, action: bpy.types.Action, settings_n
     """Give an object an action that was written into one of :func:`generated_action`, and mark it
     as it is now.
     """
-    _assign(obj, action)
+    assign_action(obj, action)
     mark_generated(obj, action, settings_note)
 
 
 def mark_generated(obj: bpy.types.Object, action: bpy.types.Action, settings_note: str) -> None:
     """Mark an action as it is now; of one that is a layer of the NLA, its tracks are remembered."""
+    finished(marking_generated(obj.name, action, settings_note))
+
+
+def marking_generated(
+    owner: str, action: bpy.types.Action, settings_note: str
+) -> Generator[None, None, None]:
+    """The same in steps, between which the action stays as it is; the owner by name."""
     tracks = _tracks_of(action)
-    handles = {
-        (path, index): _handles(curve)
-        for path, index, _, curve in _listed(action)
-        if _has_own_handles(curve)
-    }
-    _mark(action, obj, settings_note, None, handles)
+    handles: dict[tuple[str, int], np.ndarray] = {}
+    listed = _listed(action)
+    for start in range(0, len(listed), _CURVES_AT_ONCE):
+        handles |= {
+            (path, index): _handles(curve)
+            for path, index, _, curve in listed[start : start + _CURVES_AT_ONCE]
+            if _has_own_handles(curve)
+        }
+        yield
+    fingerprint = ""
+    for text in _fingerprint(action):
+        fingerprint = text
+        yield
+    _mark(action, owner, settings_note, fingerprint, handles)
     for key, name in tracks.items():
         action[MARK][key] = name
 
@@ -259,7 +275,7 @@ def _tracks_of(action: bpy.types.Action) -> dict[str, str]:
     return {key: mark[key] for key in ("track", "beneath") if key in mark}
 
 
-def _assign(obj: bpy.types.Object, action: bpy.types.Action) -> None:
+def assign_action(obj: bpy.types.Object, action: bpy.types.Action) -> None:
     """Assign an action with its slot. The one before is saved from being purged if nothing else
     uses it.
     """
@@ -274,16 +290,16 @@ def _assign(obj: bpy.types.Object, action: bpy.types.Action) -> None:
 
 def _mark(
     action: bpy.types.Action,
-    obj: bpy.types.Object,
+    owner: str,
     settings_note: str,
-    digests: Mapping[tuple[str, int], bytes] | None,
+    fingerprint: str,
     handles: Mapping[tuple[str, int], np.ndarray],
 ) -> None:
     action[MARK] = {
-        "owner": obj.name,
+        "owner": owner,
         "name": action.name,
         "version": _MARK_VERSION,
-        "fingerprint": deque(_fingerprint(action, digests), maxlen=1).pop(),
+        "fingerprint": fingerprint,
         "note": settings_note,
         "keys": key_count(action),
         "curves": sum(len(each.fcurves) for each in channelbags_of(action)),

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Generator, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -27,6 +27,7 @@ from ...core.rotations import (
 from ...core.skeleton import Skeleton
 from ...core.splicing.clip import Clip, orientations_of, unposed, without_scale
 from ...core.splicing.transfer import bones_beneath
+from ...core.steps import finished
 from ..rig import armature_data, bone_and_property, pose_of, read_skeleton, world_matrix
 from .actions import (
     curves_of,
@@ -82,7 +83,23 @@ def read_clip(
     frames: ArrayLike | None = None,
     rate: float | None = None,
 ) -> Clip:
+    """What :func:`reading_clip` comes to."""
+    return finished(reading_clip(armature, action, slot, visual=visual, frames=frames, rate=rate))
+
+
+def reading_clip(
+    armature: bpy.types.Object,
+    action: bpy.types.Action | None = None,
+    slot: bpy.types.ActionSlot | None = None,
+    *,
+    visual: bool = False,
+    frames: ArrayLike | None = None,
+    rate: float | None = None,
+    unkeyed: UnkeyedPose | None = None,
+) -> Generator[None, None, Clip]:
     """The motion that an action gives an armature. Nothing in the file is changed.
+
+    In steps, but for what is read as shown; between them the action must not get or lose curves.
 
     What the action has no curve for keeps its value: where the object stands, and a bone's pose,
     as far as nothing else moves it (glTF files pose bones that no action of theirs moves). But
@@ -102,6 +119,7 @@ def read_clip(
         frames: (frames,) ascending, subframes allowed; the whole frames between the slot's first
             and last key, or of the action's manual frame range, if none is given.
         rate: frames per second, the scene's if none is given.
+        unkeyed: the armature's unkeyed pose, if it is known.
 
     Raises:
         RigError: the object is no armature, or has no bones.
@@ -124,9 +142,9 @@ def read_clip(
             )
         times = _checked_frames(_track_range(armature) if frames is None else frames, frames)
         return _shown_clip(armature, skeleton, armature.name, times, per_second)
-    return _action_clip(
-        armature, skeleton, action, slot, visual=visual, frames=frames, rate=per_second
-    )
+    slot = slot or slot_of(armature, action)
+    how = {"visual": visual, "frames": frames, "rate": per_second, "unkeyed": unkeyed}
+    return (yield from _action_clip(armature, skeleton, action, slot, **how))
 
 
 def read_pose(
@@ -316,6 +334,8 @@ def resized_bones(
     slot: bpy.types.ActionSlot | None,
     frames: Floats,
     changed: Collection[str],
+    *,
+    unkeyed: UnkeyedPose | None = None,
 ) -> tuple[list[str], list[str]]:
     """Bones that are scaled and carry others, of which a clip has the places, not the size.
 
@@ -327,16 +347,17 @@ def resized_bones(
         slot: its slot; if none is given the one that the armature uses, or would.
         frames: (frames,)
         changed: names of the bones that no longer move as the action says.
+        unkeyed: the armature's unkeyed pose, if it is known.
 
     Returns:
         Names of the bones that lose their size, and of these and all that they carry.
     """
     skeleton = read_skeleton(armature)
     curves = _curves_of(action, slot or slot_of(armature, action), skeleton)
-    unkeyed = unkeyed_pose(armature)
+    pose = unkeyed_pose(armature) if unkeyed is None else unkeyed
 
     def size(name: str) -> Floats:
-        otherwise = unkeyed.get((name, "scale"), AT_REST["scale"])
+        otherwise = pose.get((name, "scale"), AT_REST["scale"])
         return _values(curves, name, "scale", otherwise, frames)
 
     off = np.array([np.abs(size(name) - 1.0).max() for name in skeleton.names])
@@ -358,13 +379,13 @@ def _action_clip(
     armature: bpy.types.Object,
     skeleton: Skeleton,
     action: bpy.types.Action,
-    slot: bpy.types.ActionSlot | None,
+    slot: bpy.types.ActionSlot,
     *,
     visual: bool,
     frames: ArrayLike | None,
     rate: float,
-) -> Clip:
-    slot = slot or slot_of(armature, action)
+    unkeyed: UnkeyedPose | None,
+) -> Generator[None, None, Clip]:
     curves = _curves_of(action, slot, skeleton)
     if not curves:
         raise ClipError(
@@ -380,8 +401,9 @@ def _action_clip(
         with assigned(armature, action, slot):
             shown = _shown_clip(armature, skeleton, action.name, times, rate)
         return replace(shown, cyclic=frames is None and _is_cyclic(action, curves, shown))
-    unkeyed = unkeyed_pose(armature)
-    rotations, locations, scales = _bone_motion(armature, skeleton, curves, unkeyed, times)
+    pose = unkeyed_pose(armature) if unkeyed is None else unkeyed
+    moved = yield from _bone_motion(armature, skeleton, curves, pose, times)
+    rotations, locations, scales = moved
     world, own = _object_motion(armature, curves, times)
     if not all(np.isfinite(each).all() for each in (rotations, locations, world)):
         raise ClipError(
@@ -642,8 +664,10 @@ def _bone_motion(
     curves: _Curves,
     unkeyed: UnkeyedPose,
     times: Floats,
-) -> tuple[Floats, Floats, Floats | None]:
-    """Rotations (frames, bones, 4), locations and, if there are any, scales (frames, bones, 3)."""
+) -> Generator[None, None, tuple[Floats, Floats, Floats | None]]:
+    """Rotations (frames, bones, 4), locations and, if there are any, scales (frames, bones, 3), in
+    steps.
+    """
     shape = (len(times), len(skeleton))
     rotations = np.broadcast_to(IDENTITY, (*shape, 4)).copy()
     locations = np.zeros((*shape, 3))
@@ -661,6 +685,7 @@ def _bone_motion(
             locations[:, number] = moved @ location_axes(armature, skeleton, number)
         if (name, "scale") in present:
             scales[:, number] = values(name, "scale")
+        yield
     for mode in set(modes.values()):
         channel = rotation_property(mode)
         chosen = [
@@ -668,8 +693,12 @@ def _bone_motion(
         ]
         if chosen:
             numbers = [skeleton.index[name] for name in chosen]
-            turned = np.stack([values(name, channel) for name in chosen], axis=1)
-            rotations[:, numbers] = from_mode_values(turned, mode)
+            turned: list[Floats] = []
+            for name in chosen:
+                turned.append(values(name, channel))
+                yield
+            rotations[:, numbers] = from_mode_values(np.stack(turned, axis=1), mode)
+            yield
     off = np.abs(scales - 1.0).max(axis=(0, 2))
     stretching = (off > _ROUNDING) & _stretches_apart(armature, skeleton, off > _ROUNDING)
     kept = None

@@ -254,7 +254,10 @@ def show_pose(
             place = Vector(location)
             if not bone.bone.use_local_location:
                 place = carrying_axes(bone.bone) @ place
-            bone.matrix_basis = Matrix.LocRotScale(place[:], Quaternion(rotation), size)
+            basis = Matrix.LocRotScale(place[:], Quaternion(rotation), size)
+            # What is so already, but for rounding, may be a pose without keys.
+            if np.abs(np.subtract(basis, bone.matrix_basis)).max() > _UNMOVED:
+                bone.matrix_basis = basis
 
 
 PropertyValues = dict[str, tuple[float, ...]]

@@ -9,7 +9,7 @@ it is not, there are keys.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -32,6 +32,7 @@ from ...core.keyframes import (
 from ...core.phrases import phrase
 from ...core.rotations import Floats
 from ...core.splicing.clip import Clip
+from ...core.steps import finished
 from ..rig import pose_of
 from .actions import (
     add_cycles,
@@ -138,26 +139,63 @@ def write_spliced(
         WriteError: the armature is read-only, or in NLA tweak mode.
     """
     writable_armature(armature)
+    unkeyed = unkeyed_pose(armature)
+
+    def target() -> bpy.types.Action:
+        keep_unkeyed_pose(armature)
+        result = generated_action(armature, name, previous)
+        take_off(armature, result)
+        return result
+
+    result = finished(
+        filling_spliced(
+            armature, action, slot, motion, target=target, unkeyed=unkeyed, settings=settings
+        )
+    )
+    assign_generated(armature, result, note)
+    rest_unkeyed(armature, result, unkeyed)
+    return result
+
+
+def filling_spliced(
+    armature: bpy.types.Object,
+    action: bpy.types.Action,
+    slot: bpy.types.ActionSlot | None,
+    motion: SplicedMotion,
+    *,
+    target: Callable[[], bpy.types.Action],
+    unkeyed: UnkeyedPose,
+    settings: str = "",
+) -> Generator[None, None, bpy.types.Action]:
+    """Fill an action in steps, between which neither the base's action nor the armature's may get
+    or lose curves; see :func:`write_spliced`.
+
+    Args:
+        armature: the armature object.
+        action: that of the base.
+        slot: its slot; if none is given the one that the armature uses, or would.
+        motion: what is played, and what is to be.
+        target: gives the action to fill once all is known that goes into it.
+        unkeyed: the armature's unkeyed pose.
+        settings: path of settings whose keys go along from the action that the armature has.
+    """
     base = _curves(armature, action, slot or slot_of(armature, action))
     base |= _setting_curves(armature, settings)
-    unkeyed = unkeyed_pose(armature)
-    changed = _changed(armature, motion, base, unkeyed)
-    keep_unkeyed_pose(armature)
-    result = generated_action(armature, name, previous)
-    take_off(armature, result)
+    yield
+    changed = yield from _changing(armature, motion, base, unkeyed)
+    result = target()
     writer = _Writer(own_channelbag(result, result.slots[0]), motion)
     otherwise = {each.path for each in changed} | {each.data_path for each in motion.channels}
     for path, components in base.items():
         for component, curve in components.items():
             writer.copy(path, component, curve, keys=path not in otherwise)
-    _write_changed(armature, writer, changed, base)
+        yield
+    yield from _writing_changed(armature, writer, changed, base)
     if motion.base.cyclic:
         writer.let_repeat(repeats=motion.result.cyclic)
     result.use_cyclic = motion.result.cyclic
     result.use_frame_range = True
     result.frame_start, result.frame_end = motion.first, motion.last
-    assign_generated(armature, result, note)
-    _rest_unkeyed(armature, result, unkeyed)
     return result
 
 
@@ -179,30 +217,50 @@ def write_layer(
     """
     writable_armature(armature)
     check_layers(armature)
-    slot = slot or slot_of(armature, action)
-    base, unkeyed = _curves(armature, action, slot), unkeyed_pose(armature)
-    changed = _changed(armature, motion, base, unkeyed)
-    keep_unkeyed_pose(armature)
-    result = generated_action(armature, name, previous)
-    writer = _Writer(own_channelbag(result, result.slots[0]), motion)
-    _write_changed(armature, writer, changed, base)
-    ends = [each.frames[[0, -1]] for found in changed for each in found.stretches]
-    first, last = motion.first, motion.last
-    if ends and motion.anew is None and not motion.channels:
-        first, last = float(np.min(ends)), float(np.max(ends))
-    writer.keep_between(first, last)
-    result.use_cyclic, result.use_frame_range = False, True
-    result.frame_start, result.frame_end = first, last
+    slot, unkeyed = slot or slot_of(armature, action), unkeyed_pose(armature)
+
+    def target() -> bpy.types.Action:
+        keep_unkeyed_pose(armature)
+        return generated_action(armature, name, previous)
+
+    result = finished(filling_layer(armature, action, slot, motion, target=target, unkeyed=unkeyed))
     mark_generated(armature, result, note)
     lay_over(armature, result, action, slot)
     return result
 
 
-def _write_changed(
+def filling_layer(
+    armature: bpy.types.Object,
+    action: bpy.types.Action,
+    slot: bpy.types.ActionSlot,
+    motion: SplicedMotion,
+    *,
+    target: Callable[[], bpy.types.Action],
+    unkeyed: UnkeyedPose,
+) -> Generator[None, None, bpy.types.Action]:
+    """The same in steps, as :func:`filling_spliced`."""
+    base = _curves(armature, action, slot)
+    yield
+    changed = yield from _changing(armature, motion, base, unkeyed)
+    result = target()
+    writer = _Writer(own_channelbag(result, result.slots[0]), motion)
+    yield from _writing_changed(armature, writer, changed, base)
+    ends = [each.frames[[0, -1]] for found in changed for each in found.stretches]
+    first, last = motion.first, motion.last
+    if ends and motion.anew is None and not motion.channels:
+        first, last = float(np.min(ends)), float(np.max(ends))
+    yield from writer.keeping_between(first, last)
+    result.use_cyclic, result.use_frame_range = False, True
+    result.frame_start, result.frame_end = first, last
+    return result
+
+
+def _writing_changed(
     armature: bpy.types.Object, writer: _Writer, changed: Sequence[_Property], base: _Curves
-) -> None:
+) -> Iterator[None]:
     for each in changed:
         writer.change(each, base.get(each.path, {}))
+        yield
     motion = writer.motion
     if motion.anew is not None:
         for channel in bone_channels(armature, motion.anew, motion.bones):
@@ -244,7 +302,7 @@ def _resolves(armature: bpy.types.Object, path: str) -> bool:
     return True
 
 
-def _rest_unkeyed(
+def rest_unkeyed(
     armature: bpy.types.Object, action: bpy.types.Action, unkeyed: UnkeyedPose
 ) -> None:
     """Put what the action has no curve for where the base has it: another action may have left
@@ -263,10 +321,10 @@ def _rest_unkeyed(
 # --- What is otherwise than in the base -----------------------------------------------------------
 
 
-def _changed(
+def _changing(
     armature: bpy.types.Object, motion: SplicedMotion, base: _Curves, unkeyed: UnkeyedPose
-) -> list[_Property]:
-    """All properties of bones that are somewhere not what the base has."""
+) -> Generator[None, None, list[_Property]]:
+    """All properties of bones that are somewhere not what the base has, in steps."""
     skeleton = motion.base.skeleton
     found = _Changes(motion, base, unkeyed, read_channels(armature, skeleton.names))
     turned, moved, scaled = found.differing()
@@ -284,6 +342,7 @@ def _changed(
             assert motion.result.scales is not None
             values = motion.result.scales[:, number]
             result.append(found.vector(number, "scale", values, scaled[:, number]))
+        yield
     return result
 
 
@@ -424,10 +483,11 @@ class _Writer:
                 curve.modifiers.remove(modifier)
             write_keys(curve, channel_keys(channel, component, frames))
 
-    def keep_between(self, first: float, last: float) -> None:
-        """Let curves have no keys but between two frames, and at both."""
+    def keeping_between(self, first: float, last: float) -> Iterator[None]:
+        """Let curves have no keys but between two frames, and at both, in steps."""
         for curve in self._made.values():
             keep_between(curve, first, last)
+            yield
 
     def let_repeat(self, *, repeats: bool) -> None:
         """Let all curves repeat the base's cycle, as far as no modifiers do, or none of them."""

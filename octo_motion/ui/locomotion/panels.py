@@ -11,7 +11,7 @@ from ...blender.animation import key_counts
 from ...blender.files import NODE, curve_node
 from ...core.phrases import phrase
 from ..language import translated
-from ..panel_base import ArmaturePanel, TabPanel, armature_in, draw_sentence
+from ..panel_base import ArmaturePanel, TabPanel, armature_in, draw_live_error
 from .operators import (
     OCTO_MOTION_MT_gait,
     OCTO_MOTION_MT_gaits,
@@ -242,10 +242,7 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
         column.prop(settings, values[settings.timing])
         column.row().prop(settings, "keys", expand=True)
         # What comes and goes stands last: nothing jumps under the mouse.
-        if settings.live_error:
-            row = layout.row()
-            row.alert = True
-            draw_sentence(row, bpy.context, settings.live_error, "ERROR")
+        draw_live_error(layout, settings)
         if settings.result is not None:
             _draw_result(layout, settings.result)
             draw_edits(layout, cast("bpy.types.Object", settings.id_data), settings.result)

@@ -18,6 +18,7 @@ from . import (
     timing_drag,
 )
 from .import_clips import draw_in_import_menu
+from .live_splices import live_splices
 from .properties import (
     PARTS,
     OCTO_MOTION_PG_landmarks,
@@ -47,7 +48,10 @@ CLASSES: Final = (
 )
 """Operators and panels."""
 
-STEPS: Final = (Step(nothing, reference_figure.take_down_all),)
+STEPS: Final = (
+    Step(nothing, reference_figure.take_down_all),
+    Step(live_splices.listen, live_splices.listen_no_more),
+)
 """What is done when the add-on is switched on, and undone when it is switched off."""
 
 __all__ = [

@@ -18,6 +18,7 @@ from ...core.splicing.humanoid import LANDMARKS, Landmarks, ReferenceMoment
 from ...core.splicing.transfer import CHAIN, PART_TABLE, PartKind, part_named
 from .. import declared_settings as props
 from ..declared_settings import make_overridable
+from ..live import tell_switched
 
 
 def _bone(name: str, description: str) -> Any:
@@ -439,6 +440,27 @@ class OCTO_MOTION_PG_retarget(bpy.types.PropertyGroup):
         "of its splices, or its own action, or an idle one. Otherwise it stands as it rests",
     )
     visual: _as_shown("As Shown", "clip")
+    from_armature: props.PointerProperty(
+        name="From",
+        description="The armature whose clip was retargeted last, which Live follows",
+        type=bpy.types.Object,
+        poll=_is_armature,
+    )
+    from_action: _action("Clip", "The clip that was retargeted last, which Live follows")
+    from_slot: _slot("Slot of that clip; empty takes the one that fits its armature")
+    live: props.BoolProperty(
+        name="Live",
+        description="Retarget the last clip again by itself whenever a setting, the clip, the "
+        "ground or the landmarks change: the frame in sight at once, all others while Blender "
+        "idles. Switches itself off when you edit the result",
+        update=tell_switched,
+    )
+    live_error: props.StringProperty(
+        name="Live Error",
+        description="Why the result does not follow at the moment; the last one that could be "
+        "made is still there",
+        options={"HIDDEN"},
+    )
 
 
 class OCTO_MOTION_PG_splicing(bpy.types.PropertyGroup):
@@ -462,6 +484,19 @@ class OCTO_MOTION_PG_splicing(bpy.types.PropertyGroup):
         name="Result As",
         description="What is built: both play alike",
         items=RESULTS,
+    )
+    live: props.BoolProperty(
+        name="Live",
+        description="Build by itself whenever a splice, its clip, the base or the landmarks "
+        "change: the frame in sight at once, all others while Blender idles. Switches itself off "
+        "when you edit the result",
+        update=tell_switched,
+    )
+    live_error: props.StringProperty(
+        name="Live Error",
+        description="Why the result does not follow at the moment; the last one that could be "
+        "made is still there",
+        options={"HIDDEN"},
     )
     retarget: props.PointerProperty(
         name="Retarget",

@@ -26,6 +26,7 @@ from ..operator_base import (
 )
 from ..panel_base import ItemRows
 from ..preferences import begin_as_preferred
+from .live_splices import live_splices
 from .properties import PARTS, splicing_settings
 from .stack import (
     ClipReader,
@@ -118,6 +119,8 @@ class _SelectsFailed(ListOperator):
     KIND = _SPLICES
 
     def run(self, context: bpy.types.Context) -> None:
+        # A pose that is only shown is none to be read.
+        live_splices.let_go(active_armature(context))
         try:
             super().run(context)
         except ListedSpliceError as error:
@@ -315,6 +318,7 @@ class OCTO_MOTION_OT_splice_build(StackOperator, bpy.types.Operator):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         stack = prepare_splices(armature)
         report_built(self, write_splices(stack, stack.compute()))
+        live_splices.made(armature)
 
 
 class OCTO_MOTION_OT_splice_suggest_timing(SpliceOperator, bpy.types.Operator):
@@ -383,7 +387,9 @@ def build_retimed(
     motion = stack.compute()
     for name, start in zip(("base_start", "splice_start"), starts, strict=True):
         assign(settings.splices[number], name, start)
-    return write_splices(stack, motion)
+    summary = write_splices(stack, motion)
+    live_splices.made(armature)
+    return summary
 
 
 def report_built(operator: bpy.types.Operator, made: SpliceSummary, message: str = "") -> None:

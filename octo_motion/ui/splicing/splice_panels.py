@@ -9,7 +9,7 @@ import bpy
 
 from ...core.phrases import phrase
 from ..language import translated
-from ..panel_base import ArmaturePanel, armature_in, draw_list
+from ..panel_base import ArmaturePanel, armature_in, draw_list, draw_live_error
 from .landmark_table import draw_landmarks
 from .properties import part_kind, splicing_settings
 from .retarget_operators import OCTO_MOTION_OT_retarget, OCTO_MOTION_OT_retarget_files
@@ -50,9 +50,12 @@ class OCTO_MOTION_PT_splicing(_Panel, bpy.types.Panel):
     tool = "SPLICE"
 
     def show(self, layout: Any, settings: Any) -> None:
-        row = layout.row()
+        row = layout.row(align=True)
         row.scale_y = 1.5
+        # Split, the name of the switch would take half of the button's room.
+        row.use_property_split = False
         row.operator(OCTO_MOTION_OT_splice_build.bl_idname, icon="PLAY", text="Build")
+        row.prop(settings, "live", toggle=True, icon="FILE_REFRESH")
         base = layout.column()
         # It is asked for as soon as there is something to put on it.
         base.alert = settings.base is None and len(settings.splices) > 0
@@ -70,6 +73,7 @@ class OCTO_MOTION_PT_splicing(_Panel, bpy.types.Panel):
         column.operator(OCTO_MOTION_OT_splice_suggest_timing.bl_idname, icon="LIGHT")
         layout.row().prop(settings, "result_as", expand=True)
         layout.prop(settings, "visual")
+        draw_live_error(layout, settings)
         if settings.result is not None:
             layout.label(text=settings.result.name, icon="ACTION", translate=False)
 

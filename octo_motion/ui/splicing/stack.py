@@ -8,9 +8,9 @@ computes on plain arrays alone; :func:`write_splices` changes the file.
 from __future__ import annotations
 
 import json
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Container, Generator, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, cast
 
 import bpy
@@ -19,11 +19,21 @@ import numpy as np
 from ...blender.animation import (
     STEP,
     SplicedMotion,
+    StandIn,
+    UnkeyedPose,
+    check_layers,
     closes,
+    filling_layer,
+    filling_spliced,
     further_channels,
     is_recorded,
+    marking_generated,
+    play_layer,
+    play_spliced,
     read_clip,
+    reading_clip,
     resized_bones,
+    slot_of,
     writable_armature,
     write_clip,
     write_layer,
@@ -33,6 +43,7 @@ from ...blender.rig import armature_data
 from ...core.errors import ClipError, OctoMotionError, WriteError
 from ...core.locomotion.ground import Ground
 from ...core.phrases import as_phrase, joined_phrases, phrase
+from ...core.skeleton import Skeleton
 from ...core.splicing.clip import (
     Clip,
     average_pose,
@@ -133,6 +144,11 @@ class Stack:
     """… because these above them are scaled, and lose their size."""
 
     @property
+    def result_name(self) -> str:
+        """What a new result is called."""
+        return f"{self.base.clip.name} Spliced"
+
+    @property
     def acting(self) -> list[Splice]:
         """Those that are not muted."""
         return [splice for splice in self.splices if splice is not None]
@@ -223,12 +239,15 @@ class SpliceSummary:
 # --- Reading -------------------------------------------------------------------------------------
 
 
-def prepare_splices(armature: bpy.types.Object, *, between: bool = True) -> Stack:
+def prepare_splices(
+    armature: bpy.types.Object, *, between: bool = True, kept: KeptClips | None = None
+) -> Stack:
     """Read all that the stack of an armature needs. Nothing is changed.
 
     Args:
         armature: the armature object.
         between: whether the base is read between frames as well, to be built.
+        kept: what is known to be as it was when it was read before.
 
     Raises:
         OctoMotionError: something is wrong that the user can put right.
@@ -240,7 +259,7 @@ def prepare_splices(armature: bpy.types.Object, *, between: bool = True) -> Stac
             phrase("'{armature}' has no splices.", armature=armature.name),
             "Add one in the panel Splice (Add Splice).",
         )
-    reader = ClipReader()
+    reader = ClipReader(kept)
     base = reader.base(armature)
     splices: list[Splice | None] = []
     for number, item in enumerate(settings.splices):
@@ -263,8 +282,18 @@ def prepare_splices(armature: bpy.types.Object, *, between: bool = True) -> Stac
 
 
 def read_between(stack: Stack) -> Stack:
+    """What :func:`reading_between` comes to."""
+    return finished(reading_between(stack))
+
+
+def reading_between(
+    stack: Stack, unkeyed: UnkeyedPose | None = None
+) -> Generator[None, None, Stack]:
     """Read the base where its splices act, between frames as well: what is spliced is to be right
     there too. As shown, a base is read on whole frames alone, and all its bones get keys.
+
+    In steps, between which the base must not get or lose curves; the armature's unkeyed pose may
+    be known.
 
     Raises:
         OctoMotionError: it has become something that cannot be read.
@@ -283,13 +312,18 @@ def read_between(stack: Stack) -> Stack:
     moments = moments_within(base, spans, _finer(len(base)), STEP)
     slot = _slot(settings.base, settings.base_slot)
     finer = base
+    yield
     if len(moments) and is_recorded(armature, settings.base, slot):
+        yield
         finer = clip_at(base, moments)
     elif len(moments):
-        finer = read_clip(armature, settings.base, slot, frames=moments)
+        finer = yield from reading_clip(
+            armature, settings.base, slot, frames=moments, unkeyed=unkeyed
+        )
+    yield
     finer = replace(finer, cyclic=base.cyclic)
     changed = {bone for each in stack.acting for bone in _changed(stack.base, each)}
-    lost, anew = resized_bones(armature, settings.base, slot, base.frames, changed)
+    lost, anew = resized_bones(armature, settings.base, slot, base.frames, changed, unkeyed=unkeyed)
     return replace(stack, finer=finer, anew=tuple(anew), resized=tuple(lost))
 
 
@@ -302,10 +336,32 @@ def _slot(action: bpy.types.Action, identifier: str) -> bpy.types.ActionSlot | N
     return action.slots.get(identifier) if identifier else None
 
 
+@dataclass
+class KeptClips:
+    """Clips as they were read, for as long as they are so."""
+
+    clips: dict[tuple[Any, ...], tuple[Clip, Skeleton]] = field(
+        default_factory=dict[tuple[Any, ...], tuple[Clip, Skeleton]]
+    )
+    """With how their bones lie on the average, by the numbers that Blender gives armature and
+    action for as long as it runs, and how they are read."""
+    matches: Matches = field(default_factory=dict[Any, Any])
+    """Which bones of them answer to each other."""
+
+    def forget(self, numbers: Container[int]) -> None:
+        """Read clips of these armatures and actions again."""
+        gone = [key for key in self.clips if key[0] in numbers or key[1] in numbers]
+        for key in gone:
+            del self.clips[key]
+        if gone:
+            self.matches.clear()
+
+
 class ClipReader:
     """Reads clips, each of them once."""
 
-    def __init__(self) -> None:
+    def __init__(self, kept: KeptClips | None = None) -> None:
+        self.kept = kept or KeptClips()
         self.mappings: dict[str, str] = {}
         """Saved mappings that were used, by the armatures' names."""
         self.damaged: dict[str, None] = {}
@@ -362,27 +418,13 @@ class ClipReader:
 
         ``visual``: as the scene shows it; ``between``: between whole frames as well.
         """
-        key = (armature.name_full, action.name_full, slot, visual, between)
+        key = (armature.session_uid, action.session_uid, slot, visual, between)
         if key not in self._sources:
-            chosen = None
-            if slot:
-                chosen = action.slots.get(slot)
-                if chosen is None:
-                    raise ClipError(
-                        phrase(
-                            "Action '{action}' has no slot '{slot}'.",
-                            action=action.name,
-                            slot=slot[2:],
-                        ),
-                        "Choose one of its slots in the panel Splice, or leave the slot empty.",
-                    )
-            clip = read_clip(armature, action, chosen, visual=visual)
-            if between and not is_recorded(armature, action, chosen):
-                finer = _finer(len(clip))
-                count = finer * (len(clip) - 1) + 1
-                frames = np.linspace(clip.frames[0], clip.frames[-1], count)
-                clip = read_clip(armature, action, chosen, visual=visual, frames=frames)
-            known = known_landmarks(armature, clip.skeleton, average_pose(clip))
+            if key not in self.kept.clips:
+                clip = self._read(armature, action, slot, visual=visual, between=between)
+                self.kept.clips[key] = clip, average_pose(clip)
+            clip, lies = self.kept.clips[key]
+            known = known_landmarks(armature, clip.skeleton, lies)
             self.damaged |= dict.fromkeys(known.damaged)
             if known.mapping:
                 self.mappings[armature.name] = known.mapping
@@ -390,6 +432,35 @@ class ClipReader:
                 clip, known.landmarks, armature.name, known.problem, known.found
             )
         return self._sources[key]
+
+    @staticmethod
+    def _read(
+        armature: bpy.types.Object,
+        action: bpy.types.Action,
+        slot: str,
+        *,
+        visual: bool,
+        between: bool,
+    ) -> Clip:
+        chosen = None
+        if slot:
+            chosen = action.slots.get(slot)
+            if chosen is None:
+                raise ClipError(
+                    phrase(
+                        "Action '{action}' has no slot '{slot}'.",
+                        action=action.name,
+                        slot=slot[2:],
+                    ),
+                    "Choose one of its slots in the panel Splice, or leave the slot empty.",
+                )
+        clip = read_clip(armature, action, chosen, visual=visual)
+        if between and not is_recorded(armature, action, chosen):
+            finer = _finer(len(clip))
+            count = finer * (len(clip) - 1) + 1
+            frames = np.linspace(clip.frames[0], clip.frames[-1], count)
+            clip = read_clip(armature, action, chosen, visual=visual, frames=frames)
+        return clip
 
 
 def _check_mixing(armature: bpy.types.Object) -> None:
@@ -437,6 +508,7 @@ def _splice(reader: ClipReader, item: Any, base: Source) -> Splice:
         weight=read_weight(splicing_settings(item.id_data), item, base.clip),
         additive=item.blending == "ADD",
         reference=_reference(item),
+        matches=reader.kept.matches,
     )
     if part.kind is not None:
         for each in (base, source):
@@ -539,7 +611,48 @@ def suggestions(stack: Stack, number: int, count: int) -> list[Suggestion]:
 # --- Writing -------------------------------------------------------------------------------------
 
 
-def write_splices(stack: Stack, motion: SplicedMotion) -> SpliceSummary:
+NO_SETTINGS: Final = frozenset({"result", "live", "live_error"})
+"""What is no setting, though it is kept with them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Filled:
+    """A result that is in an action already, which waits to be played."""
+
+    stand_in: StandIn
+    unkeyed: UnkeyedPose
+    """The armature's, before anything of it was shown."""
+
+
+def filling_splices(
+    stack: Stack, motion: SplicedMotion, filled: Filled
+) -> Generator[None, None, None]:
+    """Fill it, in steps, between which neither the base's action nor the armature's may get or lose
+    curves. As shown, a base cannot be read in steps, and nothing is filled.
+    """
+    armature = local_object(stack.armature)
+    settings, unkeyed, stand_in = splicing_settings(armature), filled.unkeyed, filled.stand_in
+    base, slot = _base_slot(armature, settings)
+    motion = _repeating(stack, motion)
+
+    def target() -> bpy.types.Action:
+        return stand_in.action
+
+    if settings.result_as == "LAYER":
+        check_layers(armature)
+        filling = filling_layer(armature, base, slot, motion, target=target, unkeyed=unkeyed)
+    else:
+        path = settings.path_from_id("splices")
+        filling = filling_spliced(
+            armature, base, slot, motion, target=target, unkeyed=unkeyed, settings=path
+        )
+    action = yield from filling
+    yield from marking_generated(stack.armature, action, _note(settings))
+
+
+def write_splices(
+    stack: Stack, motion: SplicedMotion, filled: Filled | None = None
+) -> SpliceSummary:
     """Give the armature the result, in place of the one that was built before.
 
     Raises:
@@ -554,9 +667,10 @@ def write_splices(stack: Stack, motion: SplicedMotion) -> SpliceSummary:
         previous = None
     kept, settings.result = settings.result, None
     try:
-        cyclic = _repeats(stack.base.clip, motion.result)
-        motion = replace(motion, result=replace(motion.result, cyclic=cyclic))
-        action = _write(armature, stack, motion, previous)
+        motion = _repeating(stack, motion)
+        action = (
+            _write(armature, stack, motion, previous) if filled is None else _play(armature, filled)
+        )
     except BaseException:
         settings.result = kept
         raise
@@ -566,7 +680,7 @@ def write_splices(stack: Stack, motion: SplicedMotion) -> SpliceSummary:
         write_landmarks(settings.landmarks, stack.base.landmarks.bones)
         write_reference(settings.landmarks, stack.base.landmarks.reference)
     warnings = list(_warnings(stack, settings.splices))
-    if stack.base.clip.cyclic and not cyclic:
+    if stack.base.clip.cyclic and not motion.result.cyclic:
         warnings.append(
             phrase(
                 "'{clip}' is a cycle, but '{action}' ends in another pose than it begins in: it "
@@ -596,9 +710,7 @@ def _write(
     previous: bpy.types.Action | None,
 ) -> bpy.types.Action:
     settings = splicing_settings(armature)
-    name = f"{stack.base.clip.name} Spliced"
-    # What it was made from.
-    note = json.dumps(plain(settings, without=frozenset({"result"})), sort_keys=True)
+    name, note = stack.result_name, _note(settings)
     base, slot = settings.base, None
     if base is not None:
         slot = _slot(base, settings.base_slot)
@@ -622,9 +734,30 @@ def _write(
     )
 
 
-def _repeats(base: Clip, result: Clip) -> bool:
-    """Whether a result is a cycle: that of a cycle is, if it closes as far as that does."""
-    return base.cyclic and (closes(result.rotations) or not closes(base.rotations))
+def _play(armature: bpy.types.Object, filled: Filled) -> bpy.types.Action:
+    settings = splicing_settings(armature)
+    if settings.result_as == "LAYER":
+        return play_layer(armature, filled.stand_in, *_base_slot(armature, settings))
+    return play_spliced(armature, filled.stand_in, filled.unkeyed)
+
+
+def _base_slot(
+    armature: bpy.types.Object, settings: Any
+) -> tuple[bpy.types.Action, bpy.types.ActionSlot]:
+    base = settings.base
+    return base, _slot(base, settings.base_slot) or slot_of(armature, base)
+
+
+def _note(settings: Any) -> str:
+    """What a result was made from."""
+    return json.dumps(plain(settings, without=NO_SETTINGS), sort_keys=True)
+
+
+def _repeating(stack: Stack, motion: SplicedMotion) -> SplicedMotion:
+    """The same as a cycle, if it is one: that of a cycle is, if it closes as far as that does."""
+    base, result = stack.base.clip, motion.result
+    cyclic = base.cyclic and (closes(result.rotations) or not closes(base.rotations))
+    return replace(motion, result=replace(result, cyclic=cyclic))
 
 
 def _listed(names: Iterable[str]) -> str:
