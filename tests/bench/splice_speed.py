@@ -192,7 +192,6 @@ def _run(frames: int) -> Result:
         ],
         "compute": [(stack.Stack, "compute")],
         "keys of what is changed": [
-            (spliced_action._Changes, "differing"),
             (spliced_action._Changes, "rotation"),
             (spliced_action._Changes, "vector"),
             (spliced_action, "stretch_keys"),

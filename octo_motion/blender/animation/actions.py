@@ -335,7 +335,9 @@ def looking_whether_edited(action: bpy.types.Action) -> Generator[float, None, b
         now = text
         yield 0.5
     found = bpy.data.actions.get(name)
-    return found is None or fingerprint != now or _handles_moved(found)
+    if found is None or fingerprint != now:
+        return True
+    return (yield from _looking_at_handles(name))
 
 
 def note_of(action: bpy.types.Action) -> str:
@@ -708,17 +710,27 @@ def key_points(curve: bpy.types.FCurve, name: str = "co") -> np.ndarray:
     return points
 
 
-def _handles_moved(action: bpy.types.Action) -> bool:
-    """Whether a handle of Bézier keys is not, or no longer, where it was written.
+def _looking_at_handles(name: str) -> Generator[float, None, bool]:
+    """Whether a handle of Bézier keys is not, or no longer, where it was written; in steps.
 
     The keys themselves must be known to be as they were.
     """
+    action = bpy.data.actions[name]
     written = np.frombuffer(action[MARK].get("handles", b""), dtype=np.float32).reshape(-1, 4)
     if not len(written):
         # Then it has no curve with handles of its own: its keys would be others.
         return False
-    start = 0
-    for *_, curve in _listed(action):
+    start, listed = 0, _listed(action)
+    count = len(listed)
+    for number in range(count):
+        if number % _CURVES_AT_ONCE == _CURVES_AT_ONCE - 1:
+            yield 0.9
+            # No reference to a curve outlives a step.
+            again = bpy.data.actions.get(name)
+            listed = _listed(again) if again is not None else []
+            if len(listed) != count:
+                return True
+        *_, curve = listed[number]
         points = curve.keyframe_points
         if not _has_own_handles(curve):
             continue

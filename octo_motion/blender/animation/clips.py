@@ -360,8 +360,9 @@ def resized_bones(
         otherwise = pose.get((name, "scale"), AT_REST["scale"])
         return _values(curves, name, "scale", otherwise, frames)
 
-    off = np.array([np.abs(size(name) - 1.0).max() for name in skeleton.names])
-    scaled = off > _ROUNDING
+    sized = {name for name, channel in (*curves, *pose) if channel == "scale"}
+    off = [np.abs(size(name) - 1.0).max() if name in sized else 0.0 for name in skeleton.names]
+    scaled = np.array(off) > _ROUNDING
     lost: list[str] = []
     done: dict[int, bool] = {}
     for number in np.flatnonzero(scaled & ~_stretches_apart(armature, skeleton, scaled)).tolist():

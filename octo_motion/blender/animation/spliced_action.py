@@ -327,7 +327,8 @@ def _changing(
     """All properties of bones that are somewhere not what the base has, in steps."""
     skeleton = motion.base.skeleton
     found = _Changes(motion, base, unkeyed, read_channels(armature, skeleton.names))
-    turned, moved, scaled = found.differing()
+    yield
+    turned, moved, scaled = yield from found.differing()
     result: list[_Property] = []
     for number, bone in enumerate(skeleton.names):
         if bone in motion.bones:
@@ -356,18 +357,22 @@ class _Changes:
         skeleton = motion.base.skeleton
         self._size = float(np.ptp(skeleton.heads, axis=0).max() + skeleton.lengths.max())
 
-    def differing(self) -> tuple[_Booleans, _Booleans, _Booleans]:
-        """Where rotations, locations and scales are not the base's, (moments, bones) each."""
+    def differing(self) -> Generator[None, None, tuple[_Booleans, _Booleans, _Booleans]]:
+        """Where rotations, locations and scales are not the base's, (moments, bones) each; in
+        steps.
+        """
         base, result = self._motion.base, self._motion.result
         # Half the angle between quaternions that are close together, of either sign.
         apart = [
             np.abs(result.rotations + sign * base.rotations).max(axis=-1) for sign in (1.0, -1.0)
         ]
+        yield
         turned = 2.0 * np.minimum(*apart) > _SAME_TURN
         moved = np.abs(result.locations - base.locations).max(axis=-1) > _SAME_PLACE * self._size
         scaled = np.zeros_like(moved)
         if result.scales is not None:
             before = 1.0 if base.scales is None else base.scales
+            yield
             scaled = np.abs(result.scales - before).max(axis=-1) > _SAME_SIZE
         return turned, moved, scaled
 

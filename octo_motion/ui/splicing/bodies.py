@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Final
 
 import bpy
@@ -13,6 +14,7 @@ import numpy as np
 from ...blender.animation import read_clip
 from ...blender.files import load_mappings
 from ...blender.rig import armature_data, read_skeleton, world_matrix
+from ...core.content_cache import ContentCache, content_key
 from ...core.errors import OctoMotionError
 from ...core.skeleton import Skeleton
 from ...core.splicing.clip import average_pose
@@ -21,6 +23,7 @@ from ...core.splicing.humanoid import (
     OPTIONAL,
     Landmarks,
     ReferenceMoment,
+    SkeletonMapping,
     map_skeleton,
     recognised,
     stature,
@@ -30,6 +33,9 @@ from .properties import read_landmarks, splicing_settings
 
 REFERENCE_KEY: Final = "reference_pose"
 """Of a saved mapping: "rest", or a frame."""
+
+_maps: Final[ContentCache[SkeletonMapping]] = ContentCache()
+"""Landmarks that were found of skeletons."""
 
 _LOOKS: Final = 50
 """Frames of an action that are looked at to see how its bones lie."""
@@ -89,7 +95,8 @@ def known_landmarks(
     saved = saved_landmarks(armature)
     known = saved.bones | bones
     if not is_complete(known):
-        found = map_skeleton(skeleton, moving)
+        key = content_key(skeleton, moving)
+        found = _maps.get(key, partial(map_skeleton, skeleton, moving))
         if found.problem and not known:
             return KnownBody(None, found.problem, damaged=saved.damaged)
         known = dict(found.landmarks.bones) | known

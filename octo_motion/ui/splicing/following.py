@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 import bpy
+import numpy as np
 
 from ...blender.animation import (
     PoseValues,
@@ -35,6 +36,9 @@ from ..live import Live, is_animated, with_parents
 from ..modal_job import Job
 from .properties import splicing_settings
 from .stack import KeptClips
+
+_TURN: Final = 0.001
+"""Seconds of a turn before a step that has begun is let end: steps are not all small here."""
 
 
 class LeftAloneError(Exception):
@@ -149,7 +153,9 @@ class ClipLive(Live, ABC):
         self.kept: dict[str, KeptClips] = {}
         """What was read, by the armature's name …"""
         self.bodies: dict[str, str] = {}
-        """… when this was so of the bodies, by their names."""
+        """… when this was so of the bodies, by their names, …"""
+        self.now: dict[str, str] = {}
+        """… of which this is so as far as is known."""
         self.gone: set[int] = set()
         """Numbers that Blender gives what has changed since."""
 
@@ -189,15 +195,27 @@ class ClipLive(Live, ABC):
     ) -> None:
         its = touched & self.sources(armature)
         self.gone |= {each.session_uid for each in its}
-        others = self.others(armature)
+        moved = [e for e in self.others(armature) if e in touched or e.data in touched]
+        for each in moved:
+            self.now.pop(each.name, None)
         if certain or its:
             self.soon(armature.name, certain=True)
-        elif any(each in touched or each.data in touched for each in others):
+        elif moved:
             self.soon(armature.name, certain=False)
 
     def made_from(self, armature: bpy.types.Object) -> str:
-        bodies = [self._body(each) for each in (armature, *self.others(armature))]
-        return json.dumps([self.asked(armature), bodies], sort_keys=True)
+        everybody = armature, *self.others(armature)
+        self.now.pop(armature.name, None)
+        for each in everybody:
+            if each.name not in self.now:
+                self.now[each.name] = self._body(each)
+        return self._text(armature)
+
+    def _text(self, armature: bpy.types.Object) -> str:
+        everybody = armature, *self.others(armature)
+        landmarks = [plain(splicing_settings(each).landmarks) for each in everybody]
+        bodies = [self.now.get(each.name) for each in everybody]
+        return json.dumps([self.asked(armature), landmarks, bodies], sort_keys=True)
 
     def make(self, armature: bpy.types.Object) -> None:
         name = armature.name
@@ -221,7 +239,7 @@ class ClipLive(Live, ABC):
             self.soon(armature.name, certain=True)
             return
         try:
-            there = work.job.work(seconds)
+            there = work.job.work(min(seconds, _TURN) if np.isfinite(seconds) else seconds)
         except LeftAloneError as error:
             self.switch_off(armature, error.why)
             return
@@ -231,7 +249,7 @@ class ClipLive(Live, ABC):
                 work.following.write()
                 self.following.pop(armature.name, None)
             # Landmarks that were found are in the table now.
-            self.seen[armature.name] = self.made_from(armature)
+            self.seen[armature.name] = self._text(armature)
 
     def show(self, armature: bpy.types.Object, work: Work, frame: float) -> None:
         clip = work.following.pose(frame)
@@ -254,7 +272,7 @@ class ClipLive(Live, ABC):
 
     def clear(self) -> None:
         super().clear()
-        for known in (self.kept, self.bodies, self.gone):
+        for known in (self.kept, self.bodies, self.now, self.gone):
             known.clear()
         drop_stand_ins()
 
@@ -275,15 +293,14 @@ class ClipLive(Live, ABC):
             rest = ""
         bones = armature.pose.bones if armature.pose is not None else ()
         modes = [armature.rotation_mode, *(each.rotation_mode for each in bones)]
-        landmarks = plain(splicing_settings(armature).landmarks)
         told = {"rest": rest, "pose": pose, "modes": modes, "stands": _stands(armature)}
-        return json.dumps({**told, "landmarks": landmarks}, sort_keys=True)
+        return json.dumps(told, sort_keys=True)
 
     def _changed_bodies(self, armature: bpy.types.Object) -> set[int]:
         """Numbers of the armatures that are not what they were when their clips were read."""
         changed: set[int] = set()
         for each in (armature, *self.others(armature)):
-            now = self._body(each)
+            now = self.now[each.name]
             if self.bodies.get(each.name) != now:
                 self.bodies[each.name] = now
                 changed.add(each.session_uid)

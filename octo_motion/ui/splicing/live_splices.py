@@ -91,6 +91,7 @@ class _FollowingSplices(Following):
         motion = yield from stack.computing()
         stand_in = StandIn(armature, _previous(armature), stack.result_name)
         self._filled, self._made = Filled(stand_in, self.unkeyed), (stack, motion)
+        yield
         yield from filling_splices(stack, motion, self._filled)
 
     @property

@@ -315,7 +315,7 @@ def reading_between(
     yield
     if len(moments) and is_recorded(armature, settings.base, slot):
         yield
-        finer = clip_at(base, moments)
+        finer = yield from clip_at(base, moments)
     elif len(moments):
         finer = yield from reading_clip(
             armature, settings.base, slot, frames=moments, unkeyed=unkeyed
@@ -323,6 +323,7 @@ def reading_between(
     yield
     finer = replace(finer, cyclic=base.cyclic)
     changed = {bone for each in stack.acting for bone in _changed(stack.base, each)}
+    yield
     lost, anew = resized_bones(armature, settings.base, slot, base.frames, changed, unkeyed=unkeyed)
     return replace(stack, finer=finer, anew=tuple(anew), resized=tuple(lost))
 
@@ -345,7 +346,7 @@ class KeptClips:
     )
     """With how their bones lie on the average, by the numbers that Blender gives armature and
     action for as long as it runs, and how they are read."""
-    matches: Matches = field(default_factory=dict[Any, Any])
+    matches: Matches = field(default_factory=Matches)
     """Which bones of them answer to each other."""
 
     def forget(self, numbers: Container[int]) -> None:
@@ -638,6 +639,7 @@ def filling_splices(
     def target() -> bpy.types.Action:
         return stand_in.action
 
+    yield
     if settings.result_as == "LAYER":
         check_layers(armature)
         filling = filling_layer(armature, base, slot, motion, target=target, unkeyed=unkeyed)

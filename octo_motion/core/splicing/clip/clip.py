@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -231,8 +231,10 @@ def sample_scales(
     return values + seam_shifts(clip.scales[_SEAM][:, own], clip.frames[_SEAM], seams, seam_speeds)
 
 
-def clip_at(clip: Clip, frames: Floats) -> Clip:
-    """A clip on other frames (frames,), within its own: from frame to frame the shortest way."""
+def clip_at(clip: Clip, frames: Floats) -> Generator[None, None, Clip]:
+    """A clip on other frames (frames,), within its own: from frame to frame the shortest way; in
+    steps.
+    """
     before, after, share = _between(clip, frames)
     part = share[:, None, None]
 
@@ -242,10 +244,15 @@ def clip_at(clip: Clip, frames: Floats) -> Clip:
     world = mixed(clip.world)
     turns, _, scale = sample_world(clip, frames)
     world[:, :3, :3] = scale * to_matrix(turns)
+    rotations = np.empty((len(frames), *clip.rotations.shape[1:]))
+    for first in range(0, rotations.shape[1], _AT_ONCE):
+        some = clip.rotations[:, first : first + _AT_ONCE]
+        rotations[:, first : first + _AT_ONCE] = slerp(some[before], some[after], part[..., 0])
+        yield
     return replace(
         clip,
         frames=frames,
-        rotations=slerp(clip.rotations[before], clip.rotations[after], part[..., 0]),
+        rotations=rotations,
         locations=mixed(clip.locations),
         world=world,
         scales=None if clip.scales is None else mixed(clip.scales),
@@ -277,6 +284,9 @@ def _between(clip: Clip, frames: Floats) -> tuple[np.ndarray, np.ndarray, Floats
 
 # --- Where a clip begins again: what brings its last pose and speed and its first ones together ---
 
+
+_AT_ONCE: Final = 20
+"""Bones that are turned at one step."""
 
 _SEAM: Final = np.array([-2, -1, 0, 1])
 """The frames of a clip from which the steps at its seam are told."""

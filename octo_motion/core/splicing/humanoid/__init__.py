@@ -22,7 +22,7 @@ from .landmarks import (
     ReferenceMoment,
     mirrored,
 )
-from .mapping import map_skeleton
+from .mapping import SkeletonMapping, map_skeleton
 from .saved_mapping import (
     SavedMapping,
     damaged_mapping,
@@ -40,6 +40,7 @@ __all__ = [
     "Landmarks",
     "ReferenceMoment",
     "SavedMapping",
+    "SkeletonMapping",
     "chain_length",
     "damaged_mapping",
     "find_correspondence",

@@ -63,8 +63,25 @@ Reference = Literal["first", "rest"] | float
 """Of a clip: its first frame, its rest pose (or the reference pose that was found), or a frame."""
 
 
-Matches = dict[Any, tuple[list[Retarget], tuple[Clip, Clip]]]
-"""How parts go onto each other, and the clips that they are of, by all that was asked."""
+@dataclass(frozen=True)
+class Matches:
+    """What was found of how clips go onto each other, by all that was asked; with it the clips: as
+    long as they are kept no others are taken for them.
+    """
+
+    poses: dict[Any, tuple[tuple[MappedClip, MappedClip], tuple[Clip, Clip]]] = field(
+        default_factory=dict[Any, Any]
+    )
+    """Two clips in the poses in which they are compared."""
+    parts: dict[Any, tuple[list[Retarget], tuple[Clip, Clip]]] = field(
+        default_factory=dict[Any, Any]
+    )
+    """How their parts go onto each other."""
+
+    def clear(self) -> None:
+        """Keep nothing."""
+        self.matches.poses.clear()
+        self.parts.clear()
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +117,7 @@ class Splice:
     mirror: bool = False
     """Whether the clip is seen in a mirror: its right arm is then the part's left one. Of a chain
     the mirror image is taken, unless its bone on the splice clip is named."""
-    matches: Matches = field(default_factory=dict[Any, Any])
+    matches: Matches = field(default_factory=Matches)
     """What :meth:`retargets` has found; splices may share it."""
 
     @cached_property
@@ -129,16 +146,24 @@ class Splice:
         told = [_told(each) for each in (base.landmarks, self.landmarks)]
         asked = self.part, self.mirror, self.clavicle, seen_from
         known = id(base.clip), id(self.clip), *told, *asked
-        if known not in self.matches:
-            ours, theirs = base, self.mapped
-            if self.part.kind is not None:
-                ours, theirs = compared(whole_limbs(base)[0], whole_limbs(theirs)[0])
+        if known not in self.matches.parts:
+            ours, theirs = self._compared(base)
             found = find_retargets(
                 self._part, ours, theirs, clavicle=self.clavicle, seen_from=seen_from
             )
-            # As long as the clips are kept no others are taken for them.
-            self.matches[known] = found, (base.clip, self.clip)
-        return self.matches[known][0]
+            self.matches.parts[known] = found, (base.clip, self.clip)
+        return self.matches.parts[known][0]
+
+    def _compared(self, base: MappedClip) -> tuple[MappedClip, MappedClip]:
+        """The two clips in the poses in which they are compared."""
+        if self.part.kind is None:
+            return base, self.mapped
+        told = [_told(each) for each in (base.landmarks, self.landmarks)]
+        known = id(base.clip), id(self.clip), *told, self.mirror
+        if known not in self.matches.poses:
+            pair = compared(whole_limbs(base)[0], whole_limbs(self.mapped)[0])
+            self.matches.poses[known] = pair, (base.clip, self.clip)
+        return self.matches.poses[known][0]
 
 
 def _told(landmarks: Landmarks | None) -> Any:
@@ -282,6 +307,7 @@ class Splicer:
         if self._hung is None:
             return (yield from self._onto_limbs(base, span))
         before = self._hung.into(base)
+        yield
         result = yield from self._onto_limbs(before, span)
         return self._hung.back(result, before, base)
 
@@ -314,9 +340,10 @@ class Splicer:
         if self._travel is not None:
             whole = posture_of(base.skeleton, base.rotations, base.locations)
             self._travel.move(base, span, whole, rotations, locations)
-            yield
+        yield
         scales = self._scaled(base, span)
         result = replace(base, rotations=rotations, locations=locations, scales=scales)
+        yield
         return result if self._lock is None else (yield from self._lock.onto(result, span))
 
     def _add(
