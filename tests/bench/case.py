@@ -156,7 +156,7 @@ def _places() -> dict[str, list[Place]]:
         "measure the figures": [(computing, "_measured"), (computing, "figures")],
         "handles, few keys": [(computing, "_reduced"), (computing, "measure_keyed")],
         "values of the channels": [(computing, "_motion")],
-        "write keys": [(actions, "_write_curves")],
+        "write keys": [(actions, "_write_dense"), (actions, "_write_bezier")],
         "fingerprint of the keys": [(actions, "_keys_digest"), (actions, "_fingerprint")],
     }
 

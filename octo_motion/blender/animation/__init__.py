@@ -7,6 +7,7 @@ from .actions import (
     acting_curves,
     belongs_to,
     curves_of,
+    filling_action,
     is_edited,
     is_generated,
     is_setting,
@@ -27,6 +28,7 @@ from .actions import (
 from .artist_layer import CYCLES, edit_layer, follow, is_layer, lay_edits
 from .clip_sources import actions_for, still_clip
 from .clips import (
+    clip_channels,
     closes,
     further_channels,
     is_recorded,
@@ -74,7 +76,7 @@ from .spliced_action import (
     write_layer,
     write_spliced,
 )
-from .stand_in import StandIn, drop_stand_ins, play_layer, play_spliced
+from .stand_in import StandIn, drop_stand_ins, play_clip, play_layer, play_spliced
 
 __all__ = [
     "CYCLES",
@@ -96,11 +98,13 @@ __all__ = [
     "as_posed",
     "belongs_to",
     "check_layers",
+    "clip_channels",
     "closes",
     "curves_of",
     "displaced_bones",
     "drop_stand_ins",
     "edit_layer",
+    "filling_action",
     "filling_layer",
     "filling_spliced",
     "follow",
@@ -123,6 +127,7 @@ __all__ = [
     "may_replace",
     "note_of",
     "play_bones",
+    "play_clip",
     "play_layer",
     "play_spliced",
     "pose_kept",

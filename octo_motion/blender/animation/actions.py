@@ -46,6 +46,9 @@ rounds them anew."""
 _TRAVELS: Final = 1e-4
 """Difference between the first and last value of a place from which on a loop leads elsewhere."""
 
+_Written = tuple[dict[tuple[str, int], bytes], dict[tuple[str, int], np.ndarray]]
+"""Hashes of curves' keys, and handles of those that have keys of their own, by path and index."""
+
 _BEING_WRITTEN: Final = ""
 """Fingerprint of an action while it gets its keys."""
 CHANNELS_AT_ONCE: Final = 12
@@ -194,20 +197,68 @@ def write_action(
     (slot,) = action.slots
     channelbag = own_channelbag(action, slot)
     known = filled.digests if filled is not None and filled.name == action.name else {}
-    digests, handles = _write_curves(channelbag, times, channels, known, automatic=automatic)
+    written = finished(_writing_curves(channelbag, times, channels, known, automatic=automatic))
+    _set_range(action, channelbag, times, repeats=repeats)
+    if not beneath:
+        assign_action(obj, action)
+    _mark_written(action, obj.name, settings_note, len(times), written)
+    return action
+
+
+def filling_action(
+    owner: str,
+    action: bpy.types.Action,
+    frames: Floats,
+    channels: Sequence[Channel],
+    *,
+    settings_note: str,
+    repeats: bool,
+) -> Iterator[None]:
+    """The same in steps, but that nobody gets the action, and that it stays as it is between them.
+
+    Args:
+        owner: name of the object that is to have it.
+        action: made here, and nobody's yet.
+        frames: (frames,), ascending.
+        channels: values at these frames.
+        settings_note: kept with the action.
+        repeats: whether curves go on before their first key and after their last.
+    """
+    times = _checked(frames, channels)
+    (slot,) = action.slots
+    channelbag = own_channelbag(action, slot)
+    written = yield from _writing_curves(channelbag, times, channels, {}, automatic=False)
+    _set_range(action, channelbag, times, repeats=repeats)
+    yield
+    _mark_written(action, owner, settings_note, len(times), written)
+
+
+def _set_range(
+    action: bpy.types.Action,
+    channelbag: bpy.types.ActionChannelbag,
+    times: np.ndarray,
+    *,
+    repeats: bool,
+) -> None:
     _repeat(channelbag, repeats=repeats)
     action.use_cyclic = repeats
     action.use_frame_range = True
     action.frame_start, action.frame_end = float(times[0]), float(times[-1])
-    if not beneath:
-        assign_action(obj, action)
-    tracks = _tracks_of(action)
+
+
+def _mark_written(
+    action: bpy.types.Action,
+    owner: str,
+    settings_note: str,
+    frames: int,
+    written: _Written,
+) -> None:
+    tracks, (digests, handles) = _tracks_of(action), written
     fingerprint = deque(_fingerprint(action, digests), maxlen=1).pop()
-    _mark(action, obj.name, settings_note, fingerprint, handles)
-    action[MARK]["frames"] = len(times)
+    _mark(action, owner, settings_note, fingerprint, handles)
+    action[MARK]["frames"] = frames
     for key, track in tracks.items():
         action[MARK][key] = track
-    return action
 
 
 def generated_action(
@@ -464,17 +515,17 @@ def _checked(frames: Floats, channels: Sequence[Channel]) -> np.ndarray:
     return times
 
 
-def _write_curves(
+def _writing_curves(
     channelbag: bpy.types.ActionChannelbag,
     times: np.ndarray,
     channels: Sequence[Channel],
     filled: Mapping[tuple[str, int], bytes],
     *,
     automatic: bool,
-) -> tuple[dict[tuple[str, int], bytes], dict[tuple[str, int], np.ndarray]]:
-    """Make the curves what the channels say. Curves that are there already are filled anew, so
-    that their colours, selection and place in the editors stay; of those that were filled with keys
-    on all frames already the hashes are known.
+) -> Generator[None, None, _Written]:
+    """Make the curves what the channels say, in steps. Curves that are there already are filled
+    anew, so that their colours, selection and place in the editors stay; of those that were filled
+    with keys on all frames already the hashes are known.
 
     Returns:
         The hash of each curve's keys, by its data path and index: to read them back takes longer
@@ -507,6 +558,7 @@ def _write_curves(
             else:
                 points[:, 1] = channel.values[:, component]
                 digests[place] = _write_dense(curve, points, kinds)
+        yield
     for curve in curves.values():
         # Its group goes with the last of its curves.
         channelbag.fcurves.remove(curve)

@@ -40,7 +40,15 @@ from .actions import (
     write_action,
 )
 from .fcurves import evaluate_fcurve, goes_straight, key_range
-from .poses import AT_REST, UnkeyedPose, keep_unkeyed_pose, unkeyed_pose
+from .poses import (
+    AT_REST,
+    PoseValues,
+    UnkeyedPose,
+    keep_unkeyed_pose,
+    pose_values,
+    posed_value,
+    unkeyed_pose,
+)
 from .scene_playback import assigned, shown_poses
 
 _LEAST_SCALING: Final = 1e-6
@@ -54,6 +62,9 @@ _CLOSED: Final = np.radians(1.0)
 
 _ON_FRAME: Final = 0.01
 """Frames by which keys may miss the ends of a cycle."""
+
+_AT_ONCE: Final = 8
+"""Bones whose rotations become keys at one step."""
 
 _APART: Final = frozenset({"ALIGNED", "AVERAGE", "NONE"})
 """Ways of a bone to inherit its parent's scale that leave its own axes straight."""
@@ -205,8 +216,7 @@ def write_clip(
         WriteError: it is read-only, or in NLA tweak mode.
     """
     writable_armature(armature)
-    channels = bone_channels(armature, clip, clip.skeleton.names)
-    channels += _object_channels(armature, clip)
+    channels = finished(clip_channels(armature, clip))
     channels += besides
     keep_unkeyed_pose(armature)
     return write_action(
@@ -232,24 +242,44 @@ def is_recorded(
     return all(goes_straight(each) for own in curves.values() for each in own.values())
 
 
-def bone_channels(armature: bpy.types.Object, clip: Clip, bones: Collection[str]) -> list[Channel]:
+def clip_channels(
+    armature: bpy.types.Object, clip: Clip, posed: PoseValues | None = None
+) -> Generator[None, None, list[Channel]]:
+    """Channels of all bones of a clip and of the object, in steps; see :func:`bone_channels`."""
+    channels = yield from bone_channels(armature, clip, clip.skeleton.names, posed)
+    return channels + _object_channels(armature, clip)
+
+
+def bone_channels(
+    armature: bpy.types.Object,
+    clip: Clip,
+    bones: Collection[str],
+    posed: PoseValues | None = None,
+) -> Generator[None, None, list[Channel]]:
     """Channels of some bones of a clip: rotations, and locations and scales where there are any.
+
+    In steps. How the armature is posed may be known.
 
     Raises:
         RigError: the object is no armature, or lacks a bone.
     """
-    skeleton = clip.skeleton
+    skeleton, pose = clip.skeleton, pose_values(armature) if posed is None else posed
     numbers = [number for number, name in enumerate(skeleton.names) if name in bones]
     names = [skeleton.names[number] for number in numbers]
     known = read_channels(armature, names)
-    channels = known.rotations(names, clip.rotations[:, numbers])
-    channels += _location_channels(armature, clip, known, numbers)
+    channels: list[Channel] = []
+    for first in range(0, len(names), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        channels += known.rotations(names[some], clip.rotations[:, numbers[some]])
+        yield
+    channels += _location_channels(armature, clip, known, numbers, pose)
+    yield
     scales = np.ones(clip.locations.shape) if clip.scales is None else clip.scales
     for bone in pose_of(armature).bones:
         if bone.name not in known.paths:
             continue
         own = scales[:, skeleton.index[bone.name]]
-        if bone.scale[:] != (1.0, 1.0, 1.0) or (own != 1.0).any():
+        if posed_value(pose, bone.name, "scale") != (1.0, 1.0, 1.0) or (own != 1.0).any():
             channels.append(known.scale(bone.name, own))
     return channels
 
@@ -455,19 +485,22 @@ def _object_channels(armature: bpy.types.Object, clip: Clip) -> list[Channel]:
 
 
 def _location_channels(
-    armature: bpy.types.Object, clip: Clip, known: RigChannels, numbers: Sequence[int]
+    armature: bpy.types.Object,
+    clip: Clip,
+    known: RigChannels,
+    numbers: Sequence[int],
+    pose: PoseValues,
 ) -> list[Channel]:
     """Locations of roots, and of all bones that are not, or would not stay, where rest has them."""
     skeleton = clip.skeleton
     size = np.ptp(skeleton.heads, axis=0).max() + skeleton.lengths.max()
-    bones = pose_of(armature).bones
     channels: list[Channel] = []
     for number in numbers:
         if skeleton.connected[number]:
             continue
         name = skeleton.names[number]
         values = clip.locations[:, number]
-        still = bones[name].location[:] == (0.0, 0.0, 0.0)
+        still = posed_value(pose, name, "location") == (0.0, 0.0, 0.0)
         at_rest = still and np.abs(values).max() < _STILL * size
         if at_rest and skeleton.parents[number] >= 0:
             continue

@@ -205,6 +205,12 @@ def pose_values(armature: bpy.types.Object) -> PoseValues:
     }
 
 
+def posed_value(values: PoseValues, bone: str, channel: str) -> tuple[float, ...]:
+    """One property of a bone of :func:`pose_values`; at rest if there is no such bone."""
+    own = values.get(bone)
+    return AT_REST[channel] if own is None else own[tuple(AT_REST).index(channel)]
+
+
 def restore_pose(armature: bpy.types.Object, values: PoseValues) -> None:
     """Put bones back to values of :func:`pose_values`; bones that are gone are passed."""
     if armature.pose is None:

@@ -58,7 +58,7 @@ from .kept_curves import (
     write_baked,
     write_stretches,
 )
-from .poses import AT_REST, UnkeyedPose, keep_unkeyed_pose, unkeyed_pose
+from .poses import AT_REST, PoseValues, UnkeyedPose, keep_unkeyed_pose, unkeyed_pose
 from .splice_layer import check_layers, lay_over, take_off
 
 _SAME_TURN: Final = 4e-6
@@ -165,6 +165,7 @@ def filling_spliced(
     *,
     target: Callable[[], bpy.types.Action],
     unkeyed: UnkeyedPose,
+    posed: PoseValues | None = None,
     settings: str = "",
 ) -> Generator[None, None, bpy.types.Action]:
     """Fill an action in steps, between which neither the base's action nor the armature's may get
@@ -177,6 +178,7 @@ def filling_spliced(
         motion: what is played, and what is to be.
         target: gives the action to fill once all is known that goes into it.
         unkeyed: the armature's unkeyed pose.
+        posed: how it is posed, if that is known.
         settings: path of settings whose keys go along from the action that the armature has.
     """
     base = _curves(armature, action, slot or slot_of(armature, action))
@@ -190,7 +192,7 @@ def filling_spliced(
         for component, curve in components.items():
             writer.copy(path, component, curve, keys=path not in otherwise)
         yield
-    yield from _writing_changed(armature, writer, changed, base)
+    yield from _writing_changed(armature, writer, changed, base, posed)
     if motion.base.cyclic:
         writer.let_repeat(repeats=motion.result.cyclic)
     result.use_cyclic = motion.result.cyclic
@@ -237,6 +239,7 @@ def filling_layer(
     *,
     target: Callable[[], bpy.types.Action],
     unkeyed: UnkeyedPose,
+    posed: PoseValues | None = None,
 ) -> Generator[None, None, bpy.types.Action]:
     """The same in steps, as :func:`filling_spliced`."""
     base = _curves(armature, action, slot)
@@ -244,7 +247,7 @@ def filling_layer(
     changed = yield from _changing(armature, motion, base, unkeyed)
     result = target()
     writer = _Writer(own_channelbag(result, result.slots[0]), motion)
-    yield from _writing_changed(armature, writer, changed, base)
+    yield from _writing_changed(armature, writer, changed, base, posed)
     ends = [each.frames[[0, -1]] for found in changed for each in found.stretches]
     first, last = motion.first, motion.last
     if ends and motion.anew is None and not motion.channels:
@@ -256,14 +259,19 @@ def filling_layer(
 
 
 def _writing_changed(
-    armature: bpy.types.Object, writer: _Writer, changed: Sequence[_Property], base: _Curves
-) -> Iterator[None]:
+    armature: bpy.types.Object,
+    writer: _Writer,
+    changed: Sequence[_Property],
+    base: _Curves,
+    posed: PoseValues | None,
+) -> Generator[None, None, None]:
     for each in changed:
         writer.change(each, base.get(each.path, {}))
         yield
     motion = writer.motion
     if motion.anew is not None:
-        for channel in bone_channels(armature, motion.anew, motion.bones):
+        channels = yield from bone_channels(armature, motion.anew, motion.bones, posed)
+        for channel in channels:
             writer.replace(channel, motion.anew.frames)
     for channel in motion.channels:
         writer.replace(channel, motion.base.frames)

@@ -112,6 +112,14 @@ def play_spliced(
     return result
 
 
+def play_clip(armature: bpy.types.Object, stand_in: StandIn) -> bpy.types.Action:
+    """The same of a whole clip."""
+    keep_unkeyed_pose(armature)
+    result = stand_in.take_place()
+    assign_action(armature, result)
+    return result
+
+
 def play_layer(
     armature: bpy.types.Object,
     stand_in: StandIn,

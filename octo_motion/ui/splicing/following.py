@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from typing import Any, Final
 
 import bpy
@@ -17,11 +17,13 @@ import numpy as np
 
 from ...blender.animation import (
     PoseValues,
-    UnkeyedPose,
+    StandIn,
     acting_curves,
+    belongs_to,
     curves_of,
     drop_stand_ins,
     is_setting,
+    looking_whether_edited,
     pose_values,
     restore_pose,
     show_pose,
@@ -30,6 +32,7 @@ from ...blender.animation import (
 from ...blender.rig import read_skeleton
 from ...core.content_cache import content_key
 from ...core.errors import RigError
+from ...core.phrases import phrase
 from ...core.splicing.clip import Clip
 from ..declared_settings import assign, plain
 from ..live import Live, is_animated, with_parents
@@ -88,14 +91,14 @@ class Following(ABC):
     Args:
         armature: that gets it.
         read: actions of which curves are looked at from step to step.
-        unkeyed: its unkeyed pose.
     """
 
-    def __init__(
-        self, armature: bpy.types.Object, read: Iterable[bpy.types.Action], unkeyed: UnkeyedPose
-    ) -> None:
+    def __init__(self, armature: bpy.types.Object, read: Iterable[bpy.types.Action]) -> None:
         self.name = armature.name
-        self.unkeyed = unkeyed
+        self.unkeyed, self.posed = unkeyed_pose(armature), pose_values(armature)
+        """The armature's own pose, before anything is shown."""
+        self.stand_in: StandIn | None = None
+        """What it is written into."""
         self._curves = {each.name: _pointers(each) for each in read}
 
     @property
@@ -105,7 +108,7 @@ class Following(ABC):
             action = bpy.data.actions.get(name)
             if action is None or _pointers(action) != known:
                 return False
-        return True
+        return self.stand_in is None or self.stand_in.is_there
 
     @abstractmethod
     def pose(self, frame: float) -> Clip | None:
@@ -115,9 +118,14 @@ class Following(ABC):
             OctoMotionError: something is wrong that the user can put right.
         """
 
-    @abstractmethod
     def steps(self) -> Iterator[float]:
-        """Work all of it out, yielding the share that is done.
+        """Work all of it out."""
+        for _ in self.working():
+            yield 0.5
+
+    @abstractmethod
+    def working(self) -> Iterator[object]:
+        """The same, whatever it yields.
 
         Raises:
             LeftAloneError: the result before is not ours any more.
@@ -128,9 +136,37 @@ class Following(ABC):
     def write(self) -> None:
         """Let the armature play it."""
 
-    @abstractmethod
     def drop(self) -> None:
         """Leave nothing of it behind; safe to call twice."""
+        if self.stand_in is not None:
+            self.stand_in.drop()
+
+
+def check_ours(
+    armature: bpy.types.Object, previous: bpy.types.Action | None
+) -> Generator[float, None, None]:
+    """Make sure that a result may be made anew, in steps.
+
+    Raises:
+        LeftAloneError: it is not, or no longer, what was made.
+    """
+    if previous is None:
+        return
+    name = previous.name
+    if (yield from looking_whether_edited(previous)):
+        raise LeftAloneError(
+            phrase("Live is off: '{previous}' was edited and is yours.", previous=name)
+        )
+    found = bpy.data.actions.get(name)
+    if found is None or not belongs_to(found, armature):
+        raise LeftAloneError(
+            phrase("Live is off: '{previous}' has other users too.", previous=name)
+        )
+
+
+def not_ours(playing: bpy.types.Action) -> str:
+    """What there is to say of an armature that plays something else."""
+    return phrase("Live is off: '{playing}' is not what was generated.", playing=playing.name)
 
 
 def _pointers(action: bpy.types.Action) -> list[int]:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from typing import Any, Final
 
 import bpy
@@ -12,16 +12,19 @@ import numpy as np
 from ...blender.animation import (
     SplicedMotion,
     StandIn,
-    belongs_to,
     curves_of,
     is_setting,
-    looking_whether_edited,
-    unkeyed_pose,
 )
-from ...core.phrases import phrase
 from ...core.splicing.clip import Clip
 from ..declared_settings import plain
-from .following import ClipLive, Following, LeftAloneError, setting_action
+from .following import (
+    ClipLive,
+    Following,
+    LeftAloneError,
+    check_ours,
+    not_ours,
+    setting_action,
+)
 from .properties import splicing_settings
 from .stack import (
     NO_SETTINGS,
@@ -52,12 +55,10 @@ class _FollowingSplices(Following):
         super().__init__(
             armature,
             [each for each in (settings.base, own) if each is not None],
-            unkeyed_pose(armature),
         )
         shown = (item.visual for item in settings.splices if not item.mute)
         self._as_shown = settings.visual or any(shown)
         self._preview = self._stack.preview(0) if self._stack.acting else None
-        self._filled: Filled | None = None
         self._made: tuple[Stack, SplicedMotion] | None = None
         self._pose_is_ours = not _plays_another(armature)
 
@@ -70,63 +71,37 @@ class _FollowingSplices(Following):
         with self._stack.naming():
             return self._preview.at(frame, self._stack.acting[0].timing)
 
-    def steps(self) -> Iterator[float]:
-        yield 0.0
-        for _ in self._working():
-            yield 0.5
-
-    def _working(self) -> Generator[object, None, None]:
+    def working(self) -> Iterator[object]:
         armature = local_object(self.name)
         if why := _plays_another(armature):
             raise LeftAloneError(why)
-        previous = _previous(armature)
-        if previous is not None:
-            name = previous.name
-            edited = yield from looking_whether_edited(previous)
-            _check_ours(armature, name, edited=edited)
+        yield from check_ours(armature, _previous(armature))
         if self._as_shown:
             # That plays the scene, which cannot be done in turns.
             return
         stack = yield from reading_between(self._stack, self.unkeyed)
         motion = yield from stack.computing()
-        stand_in = StandIn(armature, _previous(armature), stack.result_name)
-        self._filled, self._made = Filled(stand_in, self.unkeyed), (stack, motion)
+        self.stand_in = StandIn(armature, _previous(armature), stack.result_name)
+        self._made = stack, motion
         yield
-        yield from filling_splices(stack, motion, self._filled)
+        yield from filling_splices(stack, motion, self._filled(self.stand_in))
 
-    @property
-    def intact(self) -> bool:
-        return super().intact and (self._filled is None or self._filled.stand_in.is_there)
+    def _filled(self, stand_in: StandIn) -> Filled:
+        return Filled(stand_in, self.unkeyed, self.posed)
 
     def write(self) -> None:
         armature = local_object(self.name)
         if self._made is None:
             stack = prepare_splices(armature)
             self._made = stack, stack.compute()
-        write_splices(*self._made, self._filled)
-
-    def drop(self) -> None:
-        if self._filled is not None:
-            self._filled.stand_in.drop()
+        filled = None if self.stand_in is None else self._filled(self.stand_in)
+        write_splices(*self._made, filled)
 
 
 def _previous(armature: bpy.types.Object) -> bpy.types.Action | None:
     """The result that is to be made anew; none if somebody splices from it."""
     previous = splicing_settings(armature).result
     return None if previous is None or is_source(previous) else previous
-
-
-def _check_ours(armature: bpy.types.Object, name: str, *, edited: bool) -> None:
-    """Raises LeftAloneError if a result must be left as it is."""
-    previous = bpy.data.actions.get(name)
-    if edited:
-        raise LeftAloneError(
-            phrase("Live is off: '{previous}' was edited and is yours.", previous=name)
-        )
-    if previous is None or not belongs_to(previous, armature):
-        raise LeftAloneError(
-            phrase("Live is off: '{previous}' has other users too.", previous=name)
-        )
 
 
 def _plays_another(armature: bpy.types.Object) -> str:
@@ -137,7 +112,7 @@ def _plays_another(armature: bpy.types.Object) -> str:
         return ""
     if all(is_setting(curve.data_path) for curve in curves_of(playing)):
         return ""
-    return phrase("Live is off: '{playing}' is not what was generated.", playing=playing.name)
+    return not_ours(playing)
 
 
 class _LiveSplices(ClipLive):

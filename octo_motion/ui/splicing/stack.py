@@ -18,6 +18,7 @@ import numpy as np
 
 from ...blender.animation import (
     STEP,
+    PoseValues,
     SplicedMotion,
     StandIn,
     UnkeyedPose,
@@ -622,7 +623,9 @@ class Filled:
 
     stand_in: StandIn
     unkeyed: UnkeyedPose
-    """The armature's, before anything of it was shown."""
+    """The armature's, before anything of it was shown, …"""
+    posed: PoseValues
+    """… and how it was posed."""
 
 
 def filling_splices(
@@ -642,12 +645,13 @@ def filling_splices(
     yield
     if settings.result_as == "LAYER":
         check_layers(armature)
-        filling = filling_layer(armature, base, slot, motion, target=target, unkeyed=unkeyed)
+        filling = filling_layer(
+            armature, base, slot, motion, target=target, unkeyed=unkeyed, posed=filled.posed
+        )
     else:
         path = settings.path_from_id("splices")
-        filling = filling_spliced(
-            armature, base, slot, motion, target=target, unkeyed=unkeyed, settings=path
-        )
+        how = {"unkeyed": unkeyed, "posed": filled.posed, "settings": path}
+        filling = filling_spliced(armature, base, slot, motion, target=target, **how)
     action = yield from filling
     yield from marking_generated(stack.armature, action, _note(settings))
 
