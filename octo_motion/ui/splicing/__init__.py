@@ -18,6 +18,7 @@ from . import (
     timing_drag,
 )
 from .import_clips import draw_in_import_menu
+from .live_retarget import live_retarget
 from .live_splices import live_splices
 from .properties import (
     PARTS,
@@ -51,6 +52,7 @@ CLASSES: Final = (
 STEPS: Final = (
     Step(nothing, reference_figure.take_down_all),
     Step(live_splices.listen, live_splices.listen_no_more),
+    Step(live_retarget.listen, live_retarget.listen_no_more),
 )
 """What is done when the add-on is switched on, and undone when it is switched off."""
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,10 +14,15 @@ import bpy
 import numpy as np
 
 from ...blender.animation import (
+    PoseValues,
+    StandIn,
     actions_for,
+    clip_channels,
+    filling_action,
     is_generated,
     may_replace,
     note_of,
+    play_clip,
     still_clip,
     writable_armature,
     write_clip,
@@ -34,8 +39,10 @@ from ...core.splicing.transfer import (
     MappedClip,
     WholeBody,
     rests_standing,
-    retarget_clip,
+    retargeting_clip,
 )
+from ...core.steps import finished
+from ..declared_settings import assign
 from .bodies import known_landmarks
 from .properties import splicing_settings, title, write_landmarks
 from .splice_operators import own_action
@@ -63,6 +70,23 @@ class RetargetJob:
     settings: WholeBody
     triangles: Floats | None = None
     """(faces, 3, 3) of the ground, world, none without."""
+    slot: str = ""
+    """Identifier of the clip's slot, "" for the one that fits."""
+
+    @property
+    def result_name(self) -> str:
+        """What a new result is called."""
+        return f"{self.source.clip.name} Retargeted"
+
+    @property
+    def note(self) -> str:
+        """By which what was made of the same clip is known."""
+        made_of = {"source": self.source.armature, "action": self.source.clip.name}
+        return json.dumps({"retargeted": made_of}, sort_keys=True)
+
+    def made(self, action: bpy.types.Action) -> bool:
+        """Whether an action was made of this clip."""
+        return note_of(action) == self.note
 
     def compute(self) -> Clip:
         """The clip on the armature's body.
@@ -71,16 +95,21 @@ class RetargetJob:
             ClipError: a bone or landmark is missing.
             GroundError: it leaves the ground.
         """
-        settings = self.settings
-        if self.triangles is not None:
-            settings = replace(settings, ground=self._ground())
-        return retarget_clip(self.base, self.still, self.source, settings, self.standing)
+        return finished(self.computing(finished(self.finding_ground())))
 
-    def _ground(self) -> Ground:
-        """The ground under its way."""
+    def computing(self, ground: Ground | None) -> Generator[None, None, Clip]:
+        """The same in steps, on this ground; none for level ground."""
+        settings = replace(self.settings, ground=ground)
+        return (
+            yield from retargeting_clip(self.base, self.still, self.source, settings, self.standing)
+        )
+
+    def finding_ground(self) -> Generator[None, None, Ground | None]:
+        """The ground under its way, in steps; none without a mesh."""
+        if self.triangles is None:
+            return None
         plain = replace(self.settings, foot_lock=False)
-        clip = retarget_clip(self.base, self.still, self.source, plain, self.standing)
-        assert self.triangles is not None
+        clip = yield from retargeting_clip(self.base, self.still, self.source, plain, self.standing)
         _, heads = clip.posed()
         hips = heads[:, clip.skeleton.index[self.base.humanoid()["hips"]]]
         size = float(np.ptp(heads[0, :, 2]))
@@ -148,6 +177,7 @@ def prepare_retarget(
         clip,
         WholeBody(goal, travel=settings.travel, foot_lock=settings.foot_lock),
         _triangles(settings),
+        slot,
     )
 
 
@@ -238,8 +268,24 @@ def _check_landmarks(source: Source) -> None:
         )
 
 
-def write_retargeted_clip(job: RetargetJob, clip: Clip, name: str = "") -> Retargeted:
-    """Give the armature the clip as an action, in place of what was made of the same one before.
+def filling_retargeted_clip(
+    job: RetargetJob, clip: Clip, action: bpy.types.Action, posed: PoseValues
+) -> Generator[None, None, None]:
+    """Put the clip into an action that nobody plays yet, in steps; of the armature the pose is
+    given.
+    """
+    armature = local_object(job.armature)
+    channels = yield from clip_channels(armature, clip, posed)
+    yield from filling_action(
+        job.armature, action, clip.frames, channels, settings_note=job.note, repeats=clip.cyclic
+    )
+
+
+def write_retargeted_clip(
+    job: RetargetJob, clip: Clip, name: str = "", *, stand_in: StandIn | None = None
+) -> Retargeted:
+    """Give the armature the clip as an action, in place of what was made of the same one before; it
+    may be in one already.
 
     Raises:
         WriteError: the object is gone, or has become read-only.
@@ -248,15 +294,12 @@ def write_retargeted_clip(job: RetargetJob, clip: Clip, name: str = "") -> Retar
     writable_armature(armature)
     settings = splicing_settings(armature)
     _remember(settings, job)
-    note = {"retargeted": {"source": job.source.armature, "action": job.source.clip.name}}
-    text = json.dumps(note, sort_keys=True)
-    action = write_clip(
-        armature,
-        clip,
-        name=name or f"{job.source.clip.name} Retargeted",
-        note=text,
-        previous=_previous(armature, text),
-    )
+    if stand_in is not None:
+        action = play_clip(armature, stand_in)
+    else:
+        previous = previous_result(armature, job)
+        name = name or job.result_name
+        action = write_clip(armature, clip, name=name, note=job.note, previous=previous)
     if job.base.found and job.base.landmarks is not None:
         # What was used is what the table shows from now on.
         write_landmarks(settings.landmarks, job.base.landmarks.bones)
@@ -264,7 +307,14 @@ def write_retargeted_clip(job: RetargetJob, clip: Clip, name: str = "") -> Retar
 
 
 def _remember(settings: Any, job: RetargetJob) -> None:
-    """Keep the armature's own action: it is not the armature's any more when the next one comes."""
+    """Keep what the next one asks for: the armature's own action, which is not the armature's any
+    more then; and where the clip is from, if that is still there.
+    """
+    retarget, source = settings.retarget, bpy.data.objects.get(job.source.armature)
+    assign(retarget, "from_armature", source)
+    clip = bpy.data.actions.get(job.source.clip.name) if source is not None else None
+    assign(retarget, "from_action", clip)
+    assign(retarget, "from_slot", job.slot)
     own = own_action(local_object(job.armature))
     if settings.retarget.standing is not None or own is None or is_generated(own[0]):
         return
@@ -272,13 +322,13 @@ def _remember(settings: Any, job: RetargetJob) -> None:
         settings.retarget.standing = own[0]
 
 
-def _previous(armature: bpy.types.Object, note: str) -> bpy.types.Action | None:
+def previous_result(armature: bpy.types.Object, job: RetargetJob) -> bpy.types.Action | None:
     """What was made of the same clip before and nobody has edited, unless it is spliced from."""
     return next(
         (
             action
             for action in bpy.data.actions
-            if note_of(action) == note and may_replace(action, armature) and not is_source(action)
+            if job.made(action) and may_replace(action, armature) and not is_source(action)
         ),
         None,
     )
@@ -321,6 +371,11 @@ class RetargetSession:
         self.made: list[Retargeted] = []
         self._clips = clips
         self._results: list[tuple[str, RetargetJob, Clip]] = []
+
+    @property
+    def target(self) -> bpy.types.Object:
+        """The armature that gets them."""
+        return local_object(self.armature)
 
     @property
     def current(self) -> str:

@@ -180,7 +180,13 @@ class OCTO_MOTION_PT_retarget(_Panel, bpy.types.Panel):
         layout.prop(retarget, "visual")
         column = layout.column(align=True)
         column.operator_context = "INVOKE_DEFAULT"
-        column.operator(OCTO_MOTION_OT_retarget.bl_idname, icon="ARMATURE_DATA")
+        row = column.row(align=True)
+        row.use_property_split = False
+        row.operator(OCTO_MOTION_OT_retarget.bl_idname, icon="ARMATURE_DATA")
+        last = row.row(align=True)
+        # It follows the last clip: one has to be there.
+        last.active = retarget.live or retarget.from_action is not None
+        last.prop(retarget, "live", toggle=True, icon="FILE_REFRESH")
         every = column.operator(
             OCTO_MOTION_OT_retarget.bl_idname, icon="DUPLICATE", text="Retarget All Actions"
         )
@@ -188,6 +194,7 @@ class OCTO_MOTION_PT_retarget(_Panel, bpy.types.Panel):
         column.operator(
             OCTO_MOTION_OT_retarget_files.bl_idname, icon="FILE_FOLDER", text="Retarget Files…"
         )
+        draw_live_error(layout, retarget)
 
 
 class OCTO_MOTION_PT_landmarks(_Panel, bpy.types.Panel):

@@ -613,7 +613,9 @@ def suggestions(stack: Stack, number: int, count: int) -> list[Suggestion]:
 # --- Writing -------------------------------------------------------------------------------------
 
 
-NO_SETTINGS: Final = frozenset({"result", "live", "live_error"})
+NO_SETTINGS: Final = frozenset(
+    {"result", "live", "live_error", "from_armature", "from_action", "from_slot"}
+)
 """What is no setting, though it is kept with them."""
 
 
