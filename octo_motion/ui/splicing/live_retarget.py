@@ -25,7 +25,7 @@ from .retargeting import (
     write_retargeted_clip,
 )
 from .splice_operators import own_action
-from .stack import ClipReader, KeptClips, Source, local_object
+from .stack import ClipReader, KeptClips, Source, is_source, local_object
 
 _NO_MATTER: Final = frozenset({"live", "live_error"})
 
@@ -87,7 +87,9 @@ class _FollowingRetarget(Following):
             return
         self._previews.ground = yield from self._job.finding_ground()
         clip = yield from self._job.computing(self._previews.ground)
-        previous = previous_result(armature, self._job)
+        previous = _playing(armature)
+        if previous is None or is_source(previous):
+            previous = previous_result(armature, self._job)
         self.stand_in = StandIn(armature, previous, self._job.result_name)
         self._clip = clip
         yield

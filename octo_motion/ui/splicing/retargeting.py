@@ -32,7 +32,7 @@ from ...core.errors import ClipError, OctoMotionError, WriteError
 from ...core.locomotion.ground import Ground, sample_ground
 from ...core.phrases import as_phrase, joined_phrases, phrase
 from ...core.rotations import Floats
-from ...core.splicing.clip import Clip, average_pose
+from ...core.splicing.clip import Clip
 from ...core.splicing.humanoid import LANDMARKS, OPTIONAL
 from ...core.splicing.transfer import (
     LimbGoal,
@@ -206,8 +206,7 @@ def _base(armature: bpy.types.Object, moving: Source | None) -> Source:
     motion of its own.
     """
     still = still_clip(armature, np.array([1.0]), 24.0)
-    lies = None if moving is None else average_pose(moving.clip)
-    known = known_landmarks(armature, still.skeleton, lies)
+    known = known_landmarks(armature, still.skeleton, None if moving is None else moving.lies)
     if moving is None or rests_standing(still.skeleton, known.landmarks):
         return Source(still, known.landmarks, armature.name, known.problem, known.found)
     return moving

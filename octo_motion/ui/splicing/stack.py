@@ -97,6 +97,8 @@ class Source(MappedClip):
     """Why there are no landmarks."""
     found: bool
     """Whether the landmarks were found just now: the armature's table is not filled."""
+    lies: Skeleton | None = None
+    """Its bones as they lie on the average, of a clip that moves."""
 
 
 class ListedSpliceError(ClipError):
@@ -431,7 +433,7 @@ class ClipReader:
             if known.mapping:
                 self.mappings[armature.name] = known.mapping
             self._sources[key] = Source(
-                clip, known.landmarks, armature.name, known.problem, known.found
+                clip, known.landmarks, armature.name, known.problem, known.found, lies
             )
         return self._sources[key]
 

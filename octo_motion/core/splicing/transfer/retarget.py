@@ -308,7 +308,7 @@ def find_retargets(
     ]
 
 
-def write_retargeted(
+def writing_retargeted(
     retarget: Retarget,
     base: Posture,
     splice: Posture,
@@ -316,8 +316,8 @@ def write_retargeted(
     locations: Floats,
     *,
     exact: bool,
-) -> None:
-    """Write the part's rotations, fully spliced, into the base's arrays.
+) -> Iterator[None]:
+    """Write the part's rotations, fully spliced, into the base's arrays, in steps.
 
     Args:
         retarget: of the part on one side.
@@ -333,17 +333,21 @@ def write_retargeted(
     # From the splice clip's world into the base's: the bodies' frames laid over each other.
     between = _between(retarget, (base, splice), (our_frame, theirs.orientation(splice)))
     result = posture_of(base.skeleton, rotations, locations)
+    yield
     if retarget.spread is not None:
         _write_spread(retarget, between, splice, result, rotations)
         locations[:, list(retarget.bones)] = 0.0
     else:
         _write_inner(retarget, between, (result, splice), rotations)
+        yield
         _write_locations(retarget, between, splice, result, locations)
+    yield
     if retarget.spine and retarget.bodies is not None:
         body, other = retarget.bodies
         result = posture_of(base.skeleton, rotations, locations)
         way = rotate(between, other.lean(splice))
         stand_over(body, result, rotations, way, np.ones(len(way)))
+        yield
     if retarget.neck is not None:
         _write_neck(retarget, between, (base.skeleton, splice), rotations, locations)
     if retarget.limb is None:

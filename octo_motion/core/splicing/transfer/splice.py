@@ -53,7 +53,7 @@ from .retarget import (
     Retarget,
     compared,
     find_retargets,
-    write_retargeted,
+    writing_retargeted,
 )
 from .travel_lock import SIGHT, TravelLock
 
@@ -329,10 +329,10 @@ class Splicer:
         turned, moved = rotations[span.frames], locations[span.frames]
         exact = self.splice.goal == "exact"
         for each in self._retargets:
-            write_retargeted(each, before, moment, turned, moved, exact=exact)
+            yield from writing_retargeted(each, before, moment, turned, moved, exact=exact)
             yield
         if self.splice.additive:
-            self._add(base, span, before, turned, moved)
+            yield from self._adding(base, span, before, turned, moved)
             yield
         if (span.weights < 1.0).any():
             _ease(base, span, self._bones, turned, moved)
@@ -346,10 +346,11 @@ class Splicer:
         yield
         return result if self._lock is None else (yield from self._lock.onto(result, span))
 
-    def _add(
+    def _adding(
         self, base: Clip, span: SpliceWindow, before: Posture, turned: Floats, moved: Floats
-    ) -> None:
-        """Put what was written, as seen from the reference, on top of what the base has there.
+    ) -> Iterator[None]:
+        """Put what was written, as seen from the reference, on top of what the base has there, in
+        steps.
 
         The reference goes onto the same postures of the base; seen from it, each bone's own turn is
         what the clip does, and comes after the base's. Blender's NLA combines quaternions alike.
@@ -357,7 +358,8 @@ class Splicer:
         still, placed = base.rotations[span.frames].copy(), base.locations[span.frames].copy()
         pose, exact = self._reference(len(still)), self.splice.goal == "exact"
         for each in self._retargets:
-            write_retargeted(each, before, pose, still, placed, exact=exact)
+            yield from writing_retargeted(each, before, pose, still, placed, exact=exact)
+        yield
         bones = self._bones
         own = base.rotations[span.frames][:, bones]
         done = multiply(conjugate(still[:, bones]), turned[:, bones])

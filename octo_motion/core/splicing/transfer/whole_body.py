@@ -52,7 +52,7 @@ from .retarget import (
     Retarget,
     compared,
     find_retargets,
-    write_retargeted,
+    writing_retargeted,
 )
 from .splice import LimbGoal
 from .travel_lock import SIGHT, above_soles, answering_balls, size_ratio
@@ -288,7 +288,9 @@ class _Mover:
         for number, each in enumerate(self._retargets):
             posture = posture_of(skeleton, rotations, locations)
             reaches = exact and each.limb is not None
-            write_retargeted(each, posture, self._moment, rotations, locations, exact=reaches)
+            yield from writing_retargeted(
+                each, posture, self._moment, rotations, locations, exact=reaches
+            )
             yield
             if number == 1:
                 # Both legs are on: what follows hangs on the pelvis.
