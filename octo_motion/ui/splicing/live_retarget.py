@@ -85,8 +85,8 @@ class _FollowingRetarget(Following):
         if self._as_shown:
             # That plays the scene, which cannot be done in turns.
             return
-        self._previews.ground = yield from self._job.finding_ground()
-        clip = yield from self._job.computing(self._previews.ground)
+        ground = self._previews.ground = yield from self._job.finding_ground()
+        clip = yield from self._preview.whole(replace(self._job.settings, ground=ground))
         previous = _playing(armature)
         if previous is None or is_source(previous):
             previous = previous_result(armature, self._job)

@@ -39,6 +39,7 @@ from ...core.splicing.transfer import (
     MappedClip,
     WholeBody,
     rests_standing,
+    retarget_clip,
     retargeting_clip,
 )
 from ...core.steps import finished
@@ -95,14 +96,8 @@ class RetargetJob:
             ClipError: a bone or landmark is missing.
             GroundError: it leaves the ground.
         """
-        return finished(self.computing(finished(self.finding_ground())))
-
-    def computing(self, ground: Ground | None) -> Generator[None, None, Clip]:
-        """The same in steps, on this ground; none for level ground."""
-        settings = replace(self.settings, ground=ground)
-        return (
-            yield from retargeting_clip(self.base, self.still, self.source, settings, self.standing)
-        )
+        settings = replace(self.settings, ground=finished(self.finding_ground()))
+        return retarget_clip(self.base, self.still, self.source, settings, self.standing)
 
     def finding_ground(self) -> Generator[None, None, Ground | None]:
         """The ground under its way, in steps; none without a mesh."""

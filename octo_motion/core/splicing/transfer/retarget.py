@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -331,7 +331,9 @@ def writing_retargeted(
     ours, theirs = retarget.frames
     our_frame = ours.orientation(base)
     # From the splice clip's world into the base's: the bodies' frames laid over each other.
-    between = _between(retarget, (base, splice), (our_frame, theirs.orientation(splice)))
+    yield
+    frames = our_frame, theirs.orientation(splice)
+    between = yield from _between(retarget, (base, splice), frames)
     result = posture_of(base.skeleton, rotations, locations)
     yield
     if retarget.spread is not None:
@@ -452,9 +454,9 @@ def _turn_limb(
 
 def _between(
     retarget: Retarget, postures: tuple[Posture, Posture], frames: tuple[Floats, Floats]
-) -> Floats:
+) -> Generator[None, None, Floats]:
     """(frames, 4) from the splice clip's armature space into the base's: their frames laid over
-    each other.
+    each other; in steps.
     """
     ours, theirs = frames
     between = multiply(ours, conjugate(theirs))
@@ -464,6 +466,7 @@ def _between(
     standing = np.ones(len(between))
     for body, posture, up in zip(retarget.bodies, postures, ups, strict=True):
         standing = standing * body.standing(posture, up)
+        yield
     upright = multiply(facing(ours, ups[0]), conjugate(facing(theirs, ups[1])))
     return slerp(between, upright, standing)
 

@@ -141,6 +141,10 @@ class RetargetPreview:
         self._frames = still.frames
         self._pair = finished(_pairing(base, still, source, standing))
 
+    def whole(self, settings: WholeBody) -> Generator[None, None, Clip]:
+        """All frames, exactly as :func:`retargeting_clip` has them, in steps."""
+        return self._pair.moving(settings)
+
     def at(self, frame: float, settings: WholeBody) -> Clip:
         """The frame nearest to this one, in a clip that has no other.
 
