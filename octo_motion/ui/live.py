@@ -491,7 +491,9 @@ def touched_by(
 
 
 def is_animated(each: bpy.types.ID) -> bool:
-    """Whether another frame may move it by itself."""
+    """Whether another frame may move it by itself; actions are told of with every frame."""
+    if isinstance(each, bpy.types.Action):
+        return True
     item: Any = each
     while item is not None:
         data = getattr(item, "data", item)

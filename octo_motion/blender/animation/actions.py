@@ -193,9 +193,7 @@ def write_action(
     """
     times = _checked(frames, channels)
     action = generated_action(obj, name, previous, replaceable=replaceable)
-    # Actions made here have one layer, one strip and one slot; with more, they count as edited.
-    (slot,) = action.slots
-    channelbag = own_channelbag(action, slot)
+    channelbag = _dense_channelbag(action)
     known = filled.digests if filled is not None and filled.name == action.name else {}
     written = finished(_writing_curves(channelbag, times, channels, known, automatic=automatic))
     _set_range(action, channelbag, times, repeats=repeats)
@@ -225,12 +223,23 @@ def filling_action(
         repeats: whether curves go on before their first key and after their last.
     """
     times = _checked(frames, channels)
-    (slot,) = action.slots
-    channelbag = own_channelbag(action, slot)
+    channelbag = _dense_channelbag(action)
     written = yield from _writing_curves(channelbag, times, channels, {}, automatic=False)
     _set_range(action, channelbag, times, repeats=repeats)
     yield
     _mark_written(action, owner, settings_note, len(times), written)
+
+
+def _dense_channelbag(action: bpy.types.Action) -> bpy.types.ActionChannelbag:
+    """The curves of an action made here, such that the keys of each are of one kind."""
+    # Actions made here have one layer, one strip and one slot; with more, they count as edited.
+    (slot,) = action.slots
+    channelbag = own_channelbag(action, slot)
+    if "frames" not in action.get(MARK, ("frames",)):
+        # It was filled otherwise, as spliced actions are.
+        for curve in channelbag.fcurves:
+            curve.keyframe_points.clear()
+    return channelbag
 
 
 def _set_range(

@@ -80,7 +80,7 @@ class Matches:
 
     def clear(self) -> None:
         """Keep nothing."""
-        self.matches.poses.clear()
+        self.poses.clear()
         self.parts.clear()
 
 
