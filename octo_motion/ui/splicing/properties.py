@@ -441,12 +441,12 @@ class OCTO_MOTION_PG_retarget(bpy.types.PropertyGroup):
     )
     visual: _as_shown("As Shown", "clip")
     from_armature: props.PointerProperty(
-        name="From",
+        name="Source",
         description="The armature whose clip was retargeted last, which Live follows",
         type=bpy.types.Object,
         poll=_is_armature,
     )
-    from_action: _action("Clip", "The clip that was retargeted last, which Live follows")
+    from_action: _action("Action", "The clip that was retargeted last, which Live follows")
     from_slot: _slot("Slot of that clip; empty takes the one that fits its armature")
     live: props.BoolProperty(
         name="Live",
