@@ -154,8 +154,15 @@ def reading_clip(
         times = _checked_frames(_track_range(armature) if frames is None else frames, frames)
         return _shown_clip(armature, skeleton, armature.name, times, per_second)
     slot = slot or slot_of(armature, action)
-    how = {"visual": visual, "frames": frames, "rate": per_second, "unkeyed": unkeyed}
-    return (yield from _action_clip(armature, skeleton, action, slot, **how))
+    return (
+        yield from _action_clip(
+            *(armature, skeleton, action, slot),
+            visual=visual,
+            frames=frames,
+            rate=per_second,
+            unkeyed=unkeyed,
+        )
+    )
 
 
 def read_pose(

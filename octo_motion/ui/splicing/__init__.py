@@ -18,8 +18,8 @@ from . import (
     timing_drag,
 )
 from .import_clips import draw_in_import_menu
-from .live_retarget import live_retarget
-from .live_splices import live_splices
+from .live_retarget import live_retargeted
+from .live_splices import live_spliced
 from .properties import (
     PARTS,
     OCTO_MOTION_PG_landmarks,
@@ -51,8 +51,8 @@ CLASSES: Final = (
 
 STEPS: Final = (
     Step(nothing, reference_figure.take_down_all),
-    Step(live_splices.listen, live_splices.listen_no_more),
-    Step(live_retarget.listen, live_retarget.listen_no_more),
+    Step(live_spliced.listen, live_spliced.listen_no_more),
+    Step(live_retargeted.listen, live_retargeted.listen_no_more),
 )
 """What is done when the add-on is switched on, and undone when it is switched off."""
 

@@ -160,4 +160,4 @@ class _LiveRetarget(ClipLive):
         self.previews.clear()
 
 
-live_retarget: Final = _LiveRetarget()
+live_retargeted: Final = _LiveRetarget()

@@ -147,4 +147,4 @@ class _LiveSplices(ClipLive):
                 yield bpy.context.scene
 
 
-live_splices: Final = _LiveSplices()
+live_spliced: Final = _LiveSplices()

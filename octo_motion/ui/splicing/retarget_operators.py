@@ -20,7 +20,7 @@ from ...core.splicing.clip import MOTION_SUFFIXES
 from ..language import reported
 from ..modal_job import ModalJob
 from ..operator_base import window_manager, without_armature
-from .live_retarget import live_retarget
+from .live_retarget import live_retargeted
 from .retargeting import (
     RetargetJob,
     RetargetSession,
@@ -76,7 +76,7 @@ class _RetargetOperator(ModalJob):
         return phrase("Retargeting {current}    Esc: none of them", current=self._session.current)
 
     def _report(self, session: RetargetSession) -> None:
-        live_retarget.made(session.target)
+        live_retargeted.made(session.target)
         told = cast("bpy.types.Operator", self)
         told.report({"INFO"}, reported(session.message))
         for warning in dict.fromkeys(each for made in session.made for each in made.warnings):
@@ -120,7 +120,7 @@ class OCTO_MOTION_OT_retarget(_RetargetOperator, bpy.types.Operator):
     def session(self, context: bpy.types.Context) -> RetargetSession:
         armature = active_armature(context)
         # A pose that is only shown is none to be read.
-        live_retarget.let_go(armature)
+        live_retargeted.let_go(armature)
         writable_armature(armature)
         source = source_armature(context, armature, self.source)
         reader = ClipReader()

@@ -26,7 +26,7 @@ from ..operator_base import (
 )
 from ..panel_base import ItemRows
 from ..preferences import begin_as_preferred
-from .live_splices import live_splices
+from .live_splices import live_spliced
 from .properties import PARTS, splicing_settings
 from .stack import (
     ClipReader,
@@ -120,7 +120,7 @@ class _SelectsFailed(ListOperator):
 
     def run(self, context: bpy.types.Context) -> None:
         # A pose that is only shown is none to be read.
-        live_splices.let_go(active_armature(context))
+        live_spliced.let_go(active_armature(context))
         try:
             super().run(context)
         except ListedSpliceError as error:
@@ -318,7 +318,7 @@ class OCTO_MOTION_OT_splice_build(StackOperator, bpy.types.Operator):
     def edit(self, context: bpy.types.Context, armature: bpy.types.Object, settings: Any) -> None:  # noqa: ARG002
         stack = prepare_splices(armature)
         report_built(self, write_splices(stack, stack.compute()))
-        live_splices.made(armature)
+        live_spliced.made(armature)
 
 
 class OCTO_MOTION_OT_splice_suggest_timing(SpliceOperator, bpy.types.Operator):
@@ -388,7 +388,7 @@ def build_retimed(
     for name, start in zip(("base_start", "splice_start"), starts, strict=True):
         assign(settings.splices[number], name, start)
     summary = write_splices(stack, motion)
-    live_splices.made(armature)
+    live_spliced.made(armature)
     return summary
 
 

@@ -654,8 +654,13 @@ def filling_splices(
         )
     else:
         path = settings.path_from_id("splices")
-        how = {"unkeyed": unkeyed, "posed": filled.posed, "settings": path}
-        filling = filling_spliced(armature, base, slot, motion, target=target, **how)
+        filling = filling_spliced(
+            *(armature, base, slot, motion),
+            target=target,
+            unkeyed=unkeyed,
+            posed=filled.posed,
+            settings=path,
+        )
     action = yield from filling
     yield from marking_generated(stack.armature, action, _note(settings))
 

@@ -15,8 +15,8 @@ import pytest
 from octo_motion.blender.animation.actions import MARK, curves_of, is_edited
 from octo_motion.blender.animation.clips import read_clip
 from octo_motion.ui.splicing.following import ClipLive
-from octo_motion.ui.splicing.live_retarget import live_retarget
-from octo_motion.ui.splicing.live_splices import live_splices
+from octo_motion.ui.splicing.live_retarget import live_retargeted
+from octo_motion.ui.splicing.live_splices import live_spliced
 from tests.ui.splicing.test_cyclic_splices import cyclic_body
 from tests.ui.splicing.test_kept_curves import sparse_hero, told
 from tests.ui.splicing.test_splicing import (
@@ -93,7 +93,7 @@ def settle(*touched: Any) -> bool:
     """That update, and all that the timers do; whether there was anything to do."""
     notice(*touched)
     before = len(MADE)
-    for live in (live_splices, live_retarget):
+    for live in (live_spliced, live_retargeted):
         live.finish_following()
     bpy.context.view_layer.update()
     return len(MADE) > before
@@ -342,10 +342,10 @@ def test_a_source_of_another_rest_pose_is_followed(hero: Any) -> None:
 def test_the_frame_in_sight_is_there_before_all_others(hero: Any) -> None:
     before, here = all_of(stack_of(hero).result), seen(hero)
     first(weight=0.3)(hero)
-    show(live_splices)
+    show(live_spliced)
     shown = seen(hero)
     assert all_of(stack_of(hero).result) == before
-    live_splices.finish_following()
+    live_spliced.finish_following()
     bpy.context.view_layer.update()
     there = seen(hero)
     assert apart(there, shown) < 1e-4
@@ -354,11 +354,11 @@ def test_the_frame_in_sight_is_there_before_all_others(hero: Any) -> None:
 
 def test_another_frame_is_shown_as_it_is_going_to_be(hero: Any) -> None:
     first(weight=0.3)(hero)
-    show(live_splices)
+    show(live_spliced)
     bpy.context.scene.frame_set(17)
     bpy.context.view_layer.update()
     shown = seen(hero)
-    live_splices.finish_following()
+    live_spliced.finish_following()
     bpy.context.view_layer.update()
     assert apart(seen(hero), shown) < 1e-4
 
@@ -367,9 +367,9 @@ def test_what_was_made_last_is_there_until_the_new_one_is_whole(hero: Any) -> No
     stack = stack_of(hero)
     before, turns = all_of(stack.result), 0
     first(weight=0.3)(hero)
-    show(live_splices)
+    show(live_spliced)
     shown = seen(hero)
-    while turn(live_splices):
+    while turn(live_spliced):
         assert all_of(stack.result) == before
         assert hero.animation_data.action == stack.result
         bpy.context.view_layer.update()
@@ -383,13 +383,13 @@ def test_what_was_made_last_is_there_until_the_new_one_is_whole(hero: Any) -> No
 def test_a_change_while_one_is_half_written_takes_its_place(hero: Any) -> None:
     stack, actions = stack_of(hero), names()
     first(weight=0.3)(hero)
-    show(live_splices)
+    show(live_spliced)
     while not any(each.startswith(".") for each in names()):
-        assert turn(live_splices)
+        assert turn(live_spliced)
     for _ in range(5):
-        assert turn(live_splices)
+        assert turn(live_spliced)
     first(weight=0.8)(hero)
-    show(live_splices)
+    show(live_spliced)
     assert names() == actions
     assert settle() is False
     live = all_of(stack.result), tracks_of(hero)
@@ -401,10 +401,10 @@ def test_a_change_while_one_is_half_written_takes_its_place(hero: Any) -> None:
 def test_what_goes_while_one_is_half_written_does_no_harm(hero: Any, what: str) -> None:
     stack, actions = stack_of(hero), names()
     first(weight=0.3)(hero)
-    show(live_splices)
+    show(live_spliced)
     while not any(each.startswith(".") for each in names()):
-        assert turn(live_splices)
-    assert turn(live_splices)
+        assert turn(live_spliced)
+    assert turn(live_spliced)
     if what == "purged":
         bpy.data.actions.remove(next(each for each in bpy.data.actions if each.name[0] == "."))
     elif what == "source":
@@ -432,10 +432,10 @@ def test_without_change_nothing_is_made_anew(hero: Any) -> None:
 
 def test_the_button_makes_what_was_on_its_way(hero: Any) -> None:
     first(weight=0.3)(hero)
-    show(live_splices)
-    assert turn(live_splices)
+    show(live_spliced)
+    assert turn(live_spliced)
     OPERATORS.splice_build()
-    assert not live_splices.following
+    assert not live_spliced.following
     assert not settle()
     live = all_of(stack_of(hero).result), tracks_of(hero)
     assert as_built(hero) == live
@@ -453,12 +453,12 @@ def test_live_is_off_until_it_is_switched_on_and_costs_nothing() -> None:
     assert not settle()
     assert all_of(stack_of(hero).result) == before
     updates = SimpleUpdates()
-    for live in (live_splices, live_retarget):
+    for live in (live_spliced, live_retargeted):
         live.after_frame(bpy.context.scene, updates)
         live.after_update(bpy.context.scene, updates)
     stack_of(hero).live = True
     with pytest.raises(AssertionError, match="thousands"):
-        live_splices.after_update(bpy.context.scene, updates)
+        live_spliced.after_update(bpy.context.scene, updates)
 
 
 class SimpleUpdates:
@@ -539,12 +539,12 @@ def test_while_a_tool_has_the_screen_the_result_waits(
     before = all_of(stack_of(hero).result)
     first(weight=0.3)(hero)
     notice()
-    monkeypatch.setattr(live_splices, "must_wait", lambda: True)
-    assert live_splices.run_pending() is not None
+    monkeypatch.setattr(live_spliced, "must_wait", lambda: True)
+    assert live_spliced.run_pending() is not None
     assert all_of(stack_of(hero).result) == before
-    assert not live_splices.following
+    assert not live_spliced.following
     monkeypatch.undo()
-    live_splices.finish_following()
+    live_spliced.finish_following()
     assert all_of(stack_of(hero).result) != before
 
 
@@ -552,9 +552,9 @@ def test_undo_and_redo_leave_splices_and_result_in_agreement(hero: Any) -> None:
     bpy.ops.ed.undo_push(message="before")
     before, actions = all_of(stack_of(hero).result), names()
     first(weight=0.3)(hero)
-    show(live_splices)
+    show(live_spliced)
     while not any(each.startswith(".") for each in names()):
-        assert turn(live_splices)
+        assert turn(live_spliced)
     # The step is closed before the result follows, as after a drag.
     bpy.ops.ed.undo_push(message="drag")
     settle()
@@ -572,9 +572,9 @@ def test_undo_and_redo_leave_splices_and_result_in_agreement(hero: Any) -> None:
 def test_a_file_is_saved_whole_and_followed_after_it_is_opened(hero: Any, tmp_path: Path) -> None:
     before, actions = all_of(stack_of(hero).result), names()
     first(weight=0.3)(hero)
-    show(live_splices)
+    show(live_spliced)
     for _ in range(20):
-        assert turn(live_splices)
+        assert turn(live_spliced)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "live.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "live.blend"))
     opened: Any = bpy.data.objects["Hero"]
@@ -600,12 +600,12 @@ def test_a_body_that_is_renamed_is_followed_on(hero: Any) -> None:
 def test_a_body_that_is_deleted_is_forgotten(hero: Any) -> None:
     actions = names()
     first(weight=0.3)(hero)
-    show(live_splices)
+    show(live_spliced)
     while not any(each.startswith(".") for each in names()):
-        assert turn(live_splices)
+        assert turn(live_spliced)
     bpy.data.objects.remove(hero)
     settle()
-    assert not live_splices.following
+    assert not live_spliced.following
     assert names() == actions
 
 
@@ -683,11 +683,11 @@ def test_a_retarget_made_live_is_what_the_button_makes(
 def test_the_frame_in_sight_of_a_retarget_is_there_before_all_others(walker: Any) -> None:
     before, here = all_of(result_of(walker)), seen(walker)
     retarget_of(walker).travel = False
-    show(live_retarget)
+    show(live_retargeted)
     shown = seen(walker)
-    while live_retarget.following:
+    while live_retargeted.following:
         assert all_of(result_of(walker)) == before
-        turn(live_retarget)
+        turn(live_retargeted)
     bpy.context.view_layer.update()
     there = seen(walker)
     # Lengths are of a body that is 1 m tall; feet look no further than two seconds.
