@@ -232,6 +232,16 @@ class _Following:
             with self.deaf():
                 self.give_back(armature, work)
 
+    def pause(self, armature: bpy.types.Object) -> None:
+        """Leave what is on its way while something else is done with the armature; what comes of
+        that is looked at afterwards.
+        """
+        name = armature.name
+        if name in self.following:
+            self.let_go(armature)
+            self.seen[name] = None
+            self.soon(name, certain=False)
+
     def switch_off(self, armature: bpy.types.Object, why: str) -> None:
         """Follow no more, and say why."""
         settings = self.settings(armature)

@@ -181,19 +181,26 @@ class Work:
         self.job = Job(following.steps())
 
 
+class _Known:
+    """What was read for one armature."""
+
+    def __init__(self) -> None:
+        self.kept = KeptClips()
+        self.bodies: dict[str, str] = {}
+        """What was so of the bodies then, by their names."""
+        self.gone: set[int] = set()
+        """Numbers that Blender gives what has changed since."""
+
+
 class ClipLive(Live, ABC):
     """Results that follow the clips and settings they are made from."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.kept: dict[str, KeptClips] = {}
-        """What was read, by the armature's name …"""
-        self.bodies: dict[str, str] = {}
-        """… when this was so of the bodies, by their names, …"""
+        self.known: dict[str, _Known] = {}
+        """What was read, by the armature's name."""
         self.now: dict[str, str] = {}
-        """… of which this is so as far as is known."""
-        self.gone: set[int] = set()
-        """Numbers that Blender gives what has changed since."""
+        """What is so of bodies as far as is known, by their names."""
 
     @abstractmethod
     def begin(self, armature: bpy.types.Object, kept: KeptClips) -> Following:
@@ -230,14 +237,17 @@ class ClipLive(Live, ABC):
         self, armature: bpy.types.Object, touched: set[bpy.types.ID], *, certain: bool
     ) -> None:
         its = touched & self.sources(armature)
-        self.gone |= {each.session_uid for each in its}
-        moved = [e for e in self.others(armature) if e in touched or e.data in touched]
-        for each in moved:
-            self.now.pop(each.name, None)
+        if armature.name in self.known:
+            self.known[armature.name].gone |= {each.session_uid for each in its}
+        moved = any(each in touched or each.data in touched for each in self.others(armature))
         if certain or its:
             self.soon(armature.name, certain=True)
         elif moved:
             self.soon(armature.name, certain=False)
+
+    def look_at(self, armature: bpy.types.Object) -> None:
+        self.now.pop(armature.name, None)
+        super().look_at(armature)
 
     def made_from(self, armature: bpy.types.Object) -> str:
         everybody = armature, *self.others(armature)
@@ -261,10 +271,10 @@ class ClipLive(Live, ABC):
             earlier.following.drop()
         # What is read of it must not be what was shown.
         shown.give_back(armature)
-        kept = self.kept.setdefault(name, KeptClips())
-        kept.forget(self.gone | self._changed_bodies(armature))
-        self.gone.clear()
-        following = self.begin(armature, kept)
+        known = self.known.setdefault(name, _Known())
+        known.kept.forget(known.gone | self._changed_bodies(armature, known))
+        known.gone.clear()
+        following = self.begin(armature, known.kept)
         work = self.following[name] = Work(following, shown)
         self.show(armature, work, _frame_now())
         assign(self.settings(armature), "live_error", "")
@@ -308,18 +318,19 @@ class ClipLive(Live, ABC):
 
     def clear(self) -> None:
         super().clear()
-        for known in (self.kept, self.bodies, self.now, self.gone):
-            known.clear()
+        self.known.clear()
+        self.now.clear()
         drop_stand_ins()
 
     # --- Bodies ---
 
     def _body(self, armature: bpy.types.Object) -> str:
         """All that is read of an armature, beside its actions, as text."""
-        work = self.following.get(armature.name)
-        if work is not None and work.shown and armature.name in self.bodies:
+        name = armature.name
+        work, known = self.following.get(name), self.known.get(name)
+        if work is not None and work.shown and known is not None and name in known.bodies:
             # The pose is not its own now.
-            pose = json.loads(self.bodies[armature.name])["pose"]
+            pose = json.loads(known.bodies[name])["pose"]
         else:
             pose = {"/".join(place): each for place, each in unkeyed_pose(armature).items()}
         try:
@@ -332,13 +343,13 @@ class ClipLive(Live, ABC):
         told = {"rest": rest, "pose": pose, "modes": modes, "stands": _stands(armature)}
         return json.dumps(told, sort_keys=True)
 
-    def _changed_bodies(self, armature: bpy.types.Object) -> set[int]:
+    def _changed_bodies(self, armature: bpy.types.Object, known: _Known) -> set[int]:
         """Numbers of the armatures that are not what they were when their clips were read."""
         changed: set[int] = set()
         for each in (armature, *self.others(armature)):
             now = self.now[each.name]
-            if self.bodies.get(each.name) != now:
-                self.bodies[each.name] = now
+            if known.bodies.get(each.name) != now:
+                known.bodies[each.name] = now
                 changed.add(each.session_uid)
         return changed
 

@@ -120,7 +120,7 @@ class OCTO_MOTION_OT_retarget(_RetargetOperator, bpy.types.Operator):
     def session(self, context: bpy.types.Context) -> RetargetSession:
         armature = active_armature(context)
         # A pose that is only shown is none to be read.
-        live_retargeted.let_go(armature)
+        live_retargeted.pause(armature)
         writable_armature(armature)
         source = source_armature(context, armature, self.source)
         reader = ClipReader()

@@ -120,7 +120,7 @@ class _SelectsFailed(ListOperator):
 
     def run(self, context: bpy.types.Context) -> None:
         # A pose that is only shown is none to be read.
-        live_spliced.let_go(active_armature(context))
+        live_spliced.pause(active_armature(context))
         try:
             super().run(context)
         except ListedSpliceError as error:

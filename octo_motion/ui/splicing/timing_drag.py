@@ -21,6 +21,7 @@ from ...core.phrases import phrase
 from ...core.splicing.clip import Timing
 from .. import at_work
 from ..language import reported, translated
+from .live_splices import live_spliced
 from .properties import splicing_settings
 from .splice_operators import SpliceOperator, active_splice, build_retimed, report_built
 from .stack import ListedSpliceError, Stack, local_object, prepare_splices
@@ -256,6 +257,7 @@ class OCTO_MOTION_OT_splice_drag_timing(SpliceOperator, bpy.types.Operator):
         assert scene is not None
         armature = active_armature(context)
         settings = splicing_settings(armature)
+        live_spliced.pause(armature)
         try:
             writable_armature(armature)
             _check_shown(active_splice(settings))

@@ -24,6 +24,7 @@ from tests.ui.splicing.test_splicing import (
     drawn,
     give_motion,
     hero_and_source,
+    make_humanoid,
     select,
     stack_of,
 )
@@ -439,6 +440,52 @@ def test_the_button_makes_what_was_on_its_way(hero: Any) -> None:
     assert not settle()
     live = all_of(stack_of(hero).result), tracks_of(hero)
     assert as_built(hero) == live
+
+
+def test_a_button_that_fails_leaves_what_was_on_its_way_to_be_made(hero: Any) -> None:
+    before = all_of(stack_of(hero).result)
+    first(weight=0.3)(hero)
+    show(live_spliced)
+    assert turn(live_spliced)
+    with pytest.raises(RuntimeError, match="no armature 'Nobody'"):
+        OPERATORS.splice_add(source="Nobody")
+    assert not live_spliced.following
+    assert all_of(stack_of(hero).result) == before
+    assert settle()
+    live = all_of(stack_of(hero).result), tracks_of(hero)
+    assert as_built(hero) == live
+
+
+def test_two_bodies_of_one_source_are_followed_each_for_itself(hero: Any) -> None:
+    source, clip = stack_of(hero).splices[0].source, stack_of(hero).splices[0].action
+    other = make_humanoid("Other", scale=1.2)
+    give_motion(other, 30)
+    select(source, other)
+    OPERATORS.splice_add()
+    OPERATORS.splice_build()
+    stack_of(other).live = True
+    settle()
+    for curve in curves_of(clip):
+        curve.keyframe_points[12].co.y += 0.05
+        curve.update()
+    assert settle(clip)
+    live = [(all_of(stack_of(each).result), tracks_of(each)) for each in (hero, other)]
+    for each, made in zip((hero, other), live, strict=True):
+        select(source, each)
+        assert as_built(each) == made
+    # Another rest pose counts for both as well.
+    stack_of(hero).live = stack_of(other).live = True
+    settle()
+    select(source)
+    bpy.ops.object.mode_set(mode="EDIT")
+    source.data.edit_bones["forearm.R"].roll += 0.7
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert settle(source.data)
+    again = [(all_of(stack_of(each).result), tracks_of(each)) for each in (hero, other)]
+    for each, made, before in zip((hero, other), again, live, strict=True):
+        assert made != before
+        select(source, each)
+        assert as_built(each) == made
 
 
 # --- Splices: whose result it is, and what goes wrong ---------------------------------------------
