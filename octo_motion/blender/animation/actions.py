@@ -46,9 +46,6 @@ rounds them anew."""
 _TRAVELS: Final = 1e-4
 """Difference between the first and last value of a place from which on a loop leads elsewhere."""
 
-_Written = tuple[dict[tuple[str, int], bytes], dict[tuple[str, int], np.ndarray]]
-"""Hashes of curves' keys, and handles of those that have keys of their own, by path and index."""
-
 _BEING_WRITTEN: Final = ""
 """Fingerprint of an action while it gets its keys."""
 CHANNELS_AT_ONCE: Final = 12
@@ -195,7 +192,8 @@ def write_action(
     action = generated_action(obj, name, previous, replaceable=replaceable)
     channelbag = _dense_channelbag(action)
     known = filled.digests if filled is not None and filled.name == action.name else {}
-    written = finished(_writing_curves(channelbag, times, channels, known, automatic=automatic))
+    written = _Written()
+    deque(written.filling(channelbag, times, channels, known, automatic=automatic), maxlen=0)
     _set_range(action, channelbag, times, repeats=repeats)
     if not beneath:
         assign_action(obj, action)
@@ -224,7 +222,8 @@ def filling_action(
     """
     times = _checked(frames, channels)
     channelbag = _dense_channelbag(action)
-    written = yield from _writing_curves(channelbag, times, channels, {}, automatic=False)
+    written = _Written()
+    yield from written.filling(channelbag, times, channels, {}, automatic=False)
     _set_range(action, channelbag, times, repeats=repeats)
     yield
     _mark_written(action, owner, settings_note, len(times), written)
@@ -262,9 +261,9 @@ def _mark_written(
     frames: int,
     written: _Written,
 ) -> None:
-    tracks, (digests, handles) = _tracks_of(action), written
-    fingerprint = deque(_fingerprint(action, digests), maxlen=1).pop()
-    _mark(action, owner, settings_note, fingerprint, handles)
+    tracks = _tracks_of(action)
+    fingerprint = deque(_fingerprint(action, written.digests), maxlen=1).pop()
+    _mark(action, owner, settings_note, fingerprint, written.handles)
     action[MARK]["frames"] = frames
     for key, track in tracks.items():
         action[MARK][key] = track
@@ -524,54 +523,62 @@ def _checked(frames: Floats, channels: Sequence[Channel]) -> np.ndarray:
     return times
 
 
-def _writing_curves(
-    channelbag: bpy.types.ActionChannelbag,
-    times: np.ndarray,
-    channels: Sequence[Channel],
-    filled: Mapping[tuple[str, int], bytes],
-    *,
-    automatic: bool,
-) -> Generator[None, None, _Written]:
-    """Make the curves what the channels say, in steps. Curves that are there already are filled
-    anew, so that their colours, selection and place in the editors stay; of those that were filled
-    with keys on all frames already the hashes are known.
+class _Written:
+    """Curves that get their keys, by data path and index."""
 
-    Returns:
-        The hash of each curve's keys, by its data path and index: to read them back takes longer
-        than to write them. The handles of those that have keys of their own.
-    """
-    digests: dict[tuple[str, int], bytes] = {}
-    handles: dict[tuple[str, int], np.ndarray] = {}
-    curves = {(curve.data_path, curve.array_index): curve for curve in channelbag.fcurves}
-    # Everything goes through the same few buffers: memory stays modest, however many the bones.
-    points, kinds = _dense_keys(times, automatic=automatic)
-    for channel in channels:
-        for component in range(channel.values.shape[1]):
-            place = (channel.data_path, component)
-            curve = curves.pop(place, None)
-            if curve is not None and place in filled and len(curve.keyframe_points) == len(times):
-                digests[place] = filled[place]
-                curve.update()
-                continue
-            if curve is None:
-                curve = channelbag.fcurves.new(channel.data_path, index=component)
-            group = curve.group
-            # Dense and reduced keys are grouped in their own ways; otherwise the artist's stays.
-            if group is None or (
-                group.name != channel.group
-                and _has_own_handles(curve) != (channel.keys is not None)
-            ):
-                curve.group = group_named(channelbag, channel.group)
-            if channel.keys is not None:
-                digests[place], handles[place] = _write_bezier(curve, channel.keys, component)
-            else:
-                points[:, 1] = channel.values[:, component]
-                digests[place] = _write_dense(curve, points, kinds)
-        yield
-    for curve in curves.values():
-        # Its group goes with the last of its curves.
-        channelbag.fcurves.remove(curve)
-    return digests, handles
+    def __init__(self) -> None:
+        self.digests: dict[tuple[str, int], bytes] = {}
+        """The hash of each curve's keys: to read them back takes longer than to write them."""
+        self.handles: dict[tuple[str, int], np.ndarray] = {}
+        """The handles of those that have keys of their own."""
+
+    def filling(
+        self,
+        channelbag: bpy.types.ActionChannelbag,
+        times: np.ndarray,
+        channels: Sequence[Channel],
+        filled: Mapping[tuple[str, int], bytes],
+        *,
+        automatic: bool,
+    ) -> Iterator[None]:
+        """Make the curves what the channels say, in steps. Curves that are there already are filled
+        anew, so that their colours, selection and place in the editors stay; of those that were
+        filled with keys on all frames already the hashes are known.
+        """
+        digests, handles = self.digests, self.handles
+        curves = {(curve.data_path, curve.array_index): curve for curve in channelbag.fcurves}
+        # Everything goes through the same few buffers: memory stays modest, however many the bones.
+        points, kinds = _dense_keys(times, automatic=automatic)
+        for channel in channels:
+            for component in range(channel.values.shape[1]):
+                place = (channel.data_path, component)
+                curve = curves.pop(place, None)
+                if (
+                    curve is not None
+                    and place in filled
+                    and len(curve.keyframe_points) == len(times)
+                ):
+                    digests[place] = filled[place]
+                    curve.update()
+                    continue
+                if curve is None:
+                    curve = channelbag.fcurves.new(channel.data_path, index=component)
+                group = curve.group
+                # Dense and reduced keys are grouped in their own ways; else the artist's stays.
+                if group is None or (
+                    group.name != channel.group
+                    and _has_own_handles(curve) != (channel.keys is not None)
+                ):
+                    curve.group = group_named(channelbag, channel.group)
+                if channel.keys is not None:
+                    digests[place], handles[place] = _write_bezier(curve, channel.keys, component)
+                else:
+                    points[:, 1] = channel.values[:, component]
+                    digests[place] = _write_dense(curve, points, kinds)
+            yield
+        for curve in curves.values():
+            # Its group goes with the last of its curves.
+            channelbag.fcurves.remove(curve)
 
 
 def _dense_keys(times: np.ndarray, *, automatic: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Generator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 import bpy
@@ -154,15 +155,8 @@ def reading_clip(
         times = _checked_frames(_track_range(armature) if frames is None else frames, frames)
         return _shown_clip(armature, skeleton, armature.name, times, per_second)
     slot = slot or slot_of(armature, action)
-    return (
-        yield from _action_clip(
-            *(armature, skeleton, action, slot),
-            visual=visual,
-            frames=frames,
-            rate=per_second,
-            unkeyed=unkeyed,
-        )
-    )
+    own = partial(_action_clip, armature, skeleton, action, slot)
+    return (yield from own(visual=visual, frames=frames, rate=per_second, unkeyed=unkeyed))
 
 
 def read_pose(
