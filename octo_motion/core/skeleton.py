@@ -35,15 +35,16 @@ def without_made_up_scale(lengths: Floats, heads: Floats, parents: Sequence[int]
     ways = np.linalg.norm(heads[below] - heads[above], axis=1)
     there = ways > 1e-6 * max(float(ways.max(initial=0.0)), 1e-12)
     above, logs = above[there], np.log(lengths[above[there]] / ways[there])
-    carrying = np.unique(above)
-    if len(carrying) < _FEWEST:
+    order = np.argsort(above, kind="stable")
+    # Not by np.unique and np.median, whose first call imports numpy's masked arrays.
+    begun = np.flatnonzero(np.diff(above[order], prepend=-1))
+    if len(begun) < _FEWEST:
         return lengths
     agreeing = np.abs(logs[:, None] - logs) < np.log1p(_AGREES)
-    bones = np.zeros((len(carrying), len(logs)), dtype=bool)
-    np.logical_or.at(bones, np.searchsorted(carrying, above), agreeing)
-    shares = bones.mean(axis=0)
+    shares = np.logical_or.reduceat(agreeing[order], begun, axis=0).mean(axis=0)
     best = int(np.argmax(shares))
-    factor = float(np.exp(np.median(logs[agreeing[:, best]])))
+    agreed = np.sort(logs[agreeing[:, best]])
+    factor = float(np.exp(0.5 * (agreed[(len(agreed) - 1) // 2] + agreed[len(agreed) // 2])))
     made_up = shares[best] >= _MOST_AGREE and abs(np.log(factor)) > np.log1p(_AS_IT_IS)
     return lengths / factor if made_up else lengths
 

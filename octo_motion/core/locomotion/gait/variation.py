@@ -47,7 +47,7 @@ def unevenness(
         streams = [_stream(seed, cycle, arm, 1) for arm in arms]
         return [each.uniform(-amount, amount, 1 + _UNLIKE.size) for each in streams]
 
-    known = {int(each): drawn(int(each)) for each in np.unique(numbers)}
+    known = {each: drawn(each) for each in set(numbers.ravel().tolist())}
     values = np.array(
         [[known[each][arm] for arm, each in enumerate(row)] for row in numbers.tolist()]
     )
@@ -125,7 +125,8 @@ def _draws(seed: int, numbers: np.ndarray, arms: np.ndarray, knots: int) -> Floa
 
     Of arms, by their numbers in the body, the draws of cycles of some numbers (cycles, arms) count.
     """
-    drawn = {int(each): _draw_cycle(seed, int(each), arms, knots) for each in np.unique(numbers)}
+    cycles = set(numbers.ravel().tolist())
+    drawn = {each: _draw_cycle(seed, each, arms, knots) for each in cycles}
     values = np.array(
         [[drawn[each][arm] for arm, each in enumerate(row)] for row in numbers.tolist()]
     )

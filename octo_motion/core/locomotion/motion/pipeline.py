@@ -106,6 +106,8 @@ _EXACT_DISTANCE: Final = 0.002
 """… and arm lengths of an arm's tip."""
 _BONES_AT_ONCE: Final = 24_000
 """Bones times frames of one step of the work: some tens of megabytes."""
+_KEPT: Final = 2**25 - 2**16
+"""Bytes of the largest arrays whose memory is kept: glibc keeps that of none beyond 2**25."""
 _HELPED: Final = 0.85
 """Share of the largest turn that is left, at most, where bones were given time."""
 _TURNS: Final = 4
@@ -144,8 +146,20 @@ def compute(job: MotionJob, *, brief: bool = False) -> Steps[MotionResult]:
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
+    keep_memory()
     plan = yield from _scaled(plan_motion(job), 0.0, _PLANNING)
     return (yield from _scaled(pose(plan, brief=brief), _PLANNING, 1.0))
+
+
+def keep_memory() -> None:
+    """Have the C library keep the memory of arrays that are done with for those to come.
+
+    It gives large ones back to the system, which clears each page anew for the next: half of all
+    pages that the first motion of a session touches. glibc stops that for all that are no larger
+    than one that it has given back [mallopt(3), M_MMAP_THRESHOLD]; elsewhere this does nothing. The
+    array is never touched, and takes no memory.
+    """
+    np.empty(_KEPT, dtype=np.uint8)
 
 
 def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:

@@ -374,7 +374,10 @@ class Shot:
         when, standing = made.plan.schedule, made.plan.first.standing
         bearings = standing.bearings if standing is not None else None
         travel = plan_travel(when.route, when.travel, when.times, bearings)
-        phases, first = np.unique(travel.phase, return_index=True)
+        # Not by np.unique, whose first call imports numpy's masked arrays.
+        order = np.argsort(travel.phase, kind="stable")
+        first = order[np.diff(travel.phase[order], prepend=-np.inf) > 0.0]
+        phases = travel.phase[first]
         wanted = 0.5 * np.pi * np.arange(np.floor(phases[-1] / (0.5 * np.pi)) + 1.0)
         return np.interp(wanted, phases, when.frames[first]).tolist()
 
