@@ -690,9 +690,14 @@ def _write_dense(curve: bpy.types.FCurve, points: np.ndarray, kinds: np.ndarray)
         kinds: (2 or 3, keys) interpolation, type, and the handles' type if they are automatic.
     """
     keys, automatic = curve.keyframe_points, len(kinds) > 2
-    alike = _alike(curve, kinds)
-    if len(keys) != len(points):
+    alike, as_many = _alike(curve, kinds), len(keys) == len(points)
+    if not as_many:
         keys.clear()
+    if automatic and curve.auto_smoothing != "NONE":
+        # Else handles depend on those of all other keys, and swing after a sudden turn. Blender
+        # places the handles of all keys that are there when this is set.
+        curve.auto_smoothing = "NONE"
+    if not as_many:
         keys.add(len(points))
     keys.foreach_set("co", points.ravel())
     if not alike:
@@ -701,9 +706,6 @@ def _write_dense(curve: bpy.types.FCurve, points: np.ndarray, kinds: np.ndarray)
         if automatic:
             keys.foreach_set("handle_left_type", kinds[2])
             keys.foreach_set("handle_right_type", kinds[2])
-    if automatic and curve.auto_smoothing != "NONE":
-        # Else handles depend on those of all other keys, and swing after a sudden turn.
-        curve.auto_smoothing = "NONE"
     curve.update()
     return _keys_digest(points, kinds)
 
