@@ -23,6 +23,17 @@ _AS_IT_IS: Final = 0.1
 """Of a length, by which it may be off without being made up."""
 
 
+def median(values: Floats) -> float:
+    """Half of some numbers (count,) are above it, at least one.
+
+    numpy's own looks whether there are masks each time, for which it first loads all that it has
+    of masked arrays: a tenth of the time that a walk of 1000 frames takes.
+    """
+    ordered = np.sort(values)
+    half = len(ordered) // 2
+    return float(ordered[half] + ordered[-half - 1]) / 2.0
+
+
 def without_made_up_scale(lengths: Floats, heads: Floats, parents: Sequence[int]) -> Floats:
     """Lengths (bones,) without a factor by which an importer made all bones too long or too short.
 
@@ -36,15 +47,14 @@ def without_made_up_scale(lengths: Floats, heads: Floats, parents: Sequence[int]
     there = ways > 1e-6 * max(float(ways.max(initial=0.0)), 1e-12)
     above, logs = above[there], np.log(lengths[above[there]] / ways[there])
     order = np.argsort(above, kind="stable")
-    # Not by np.unique and np.median, whose first call imports numpy's masked arrays.
+    # Not by np.unique, for the same reason as with ``median``.
     begun = np.flatnonzero(np.diff(above[order], prepend=-1))
     if len(begun) < _FEWEST:
         return lengths
     agreeing = np.abs(logs[:, None] - logs) < np.log1p(_AGREES)
     shares = np.logical_or.reduceat(agreeing[order], begun, axis=0).mean(axis=0)
     best = int(np.argmax(shares))
-    agreed = np.sort(logs[agreeing[:, best]])
-    factor = float(np.exp(0.5 * (agreed[(len(agreed) - 1) // 2] + agreed[len(agreed) // 2])))
+    factor = float(np.exp(median(logs[agreeing[:, best]])))
     made_up = shares[best] >= _MOST_AGREE and abs(np.log(factor)) > np.log1p(_AS_IT_IS)
     return lengths / factor if made_up else lengths
 

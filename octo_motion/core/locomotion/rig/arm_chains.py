@@ -18,7 +18,7 @@ import numpy as np
 from ...errors import RigError
 from ...phrases import phrase
 from ...rotations import Floats, normalized
-from ...skeleton import Skeleton
+from ...skeleton import Skeleton, median
 
 Side = Literal["LEFT", "RIGHT", "CENTER"]
 
@@ -166,17 +166,6 @@ def chain_of(skeleton: Skeleton, names: Iterable[str]) -> tuple[str, ...]:
             "Leave out the one that is a helper.",
         )
     return tuple(skeleton.names[bone] for bone in order)
-
-
-def median(values: Floats) -> float:
-    """Half of some numbers (count,) are above it, at least one.
-
-    numpy's own looks whether there are masks each time, for which it first loads all that it has
-    of masked arrays: a tenth of the time that a walk of 1000 frames takes.
-    """
-    ordered = np.sort(values)
-    half = len(ordered) // 2
-    return float(ordered[half] + ordered[-half - 1]) / 2.0
 
 
 def joint_positions(skeleton: Skeleton, bones: Sequence[str]) -> Floats:

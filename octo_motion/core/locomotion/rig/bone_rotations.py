@@ -338,15 +338,16 @@ def frames_of_arm(skeleton: Skeleton, bones: Sequence[str], body: BodyFrame) -> 
     down = -body.rotation[:, 2]
     inward = body.center - joints[:-1]
     inward -= np.outer(inward @ down, down)
+    back = conjugate(orientations)
+    ways = rotate(back, down), rotate(back, normalized(inward))
     facing = np.empty((len(order), 3))
     for place, bone in enumerate(order):
         named = skeleton.sucker_axes[bone]
         along = rest.segments[place]
-        back = conjugate(orientations[place])
         choices = [np.array(AXES[named], float)] if named in AXES else []
-        choices += [rotate(back, down), rotate(back, normalized(inward[place]))]
+        choices += [way[place] for way in ways]
         choices += [np.eye(3)[np.argmin(np.abs(along))]]
-        sides = [choice - (choice @ along) * along for choice in choices]
+        sides = (choice - (choice @ along) * along for choice in choices)
         facing[place] = next(each for each in sides if np.linalg.norm(each) > _NEARLY_ALONG)
     own = frame_of(rest.segments, facing)
     return ArmFrames(tuple(bones), joints[0], np.linalg.norm(steps, axis=1), rest, own)

@@ -23,7 +23,7 @@ import numpy as np
 from ...errors import RigError
 from ...phrases import phrase
 from ...rotations import Floats, normalized
-from ...skeleton import Skeleton
+from ...skeleton import Skeleton, median
 from .arm_chains import (
     AXES,
     COINCIDENT,
@@ -38,7 +38,6 @@ from .arm_chains import (
     body_rotation,
     is_driven,
     joint_positions,
-    median,
     mirror_distances,
     name_side,
     nearest_axis,
