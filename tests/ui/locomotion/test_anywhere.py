@@ -98,12 +98,18 @@ def _body(recording: Recording) -> Any:
 
 
 @pytest.mark.parametrize(
-    ("axis", "angle"), [((1.0, 0.0, 0.0), 90.0), ((0.6, 0.8, 0.0), 180.0), ((0.0, 1.0, 0.0), 75.0)]
+    ("axis", "angle"),
+    [
+        ((1.0, 0.0, 0.0), 90.0),
+        ((0.6, 0.8, 0.0), 180.0),
+        ((0.0, 1.0, 0.0), 75.0),
+        ((0.0, -1.0, 0.0), 60.0),
+    ],
 )
 def test_on_a_wall_or_ceiling_it_walks_as_on_the_floor(
     axis: tuple[float, float, float], angle: float
 ) -> None:
-    """Wall, ceiling, overhang: it is the walk on the floor, turned."""
+    """Wall, ceiling, steep slopes: it is the walk on the floor, turned."""
     turn, found = to_matrix(from_axis_angle(np.array(axis), np.radians(angle))), []
     t = np.linspace(0.0, 1.0, 40)
     for each in (np.eye(3), turn):
