@@ -179,6 +179,24 @@ def test_over_the_edge_of_a_box_and_down_its_side() -> None:
     assert body[-1, 2] < -0.7
 
 
+@pytest.mark.parametrize("kind", ["cliff up", "cliff down"])
+def test_a_cliff_of_one_arm_is_climbed_though_the_route_cuts_its_corners(kind: str) -> None:
+    rise = 1.0 if kind == "cliff up" else -1.0
+
+    def place(u: Floats, v: Floats) -> Floats:
+        corners = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0]
+        x, z = (np.interp(u, corners, each) for each in ([-4, 0, 0, 4], [0, 0, rise, rise]))
+        return np.stack([x, 8.0 * v - 4.0, z], axis=-1)
+
+    ground = _sheet(place, 4, 2)
+    way = _way(np.array([[-1.4, 0, 0], [-0.3, 0, 0], [0.3, 0, rise], [1.4, 0, rise]]))
+    recording = _check(_walk(ground, way), ground, **LIMITS[kind])
+    body = _body(recording)
+    # From the one level to the other, and always on the side that is air.
+    assert body[-1, 2] - body[0, 2] == pytest.approx(rise, abs=0.1)
+    assert np.all(body[:, 2] > np.where(body[:, 0] * rise > 0.0, max(rise, 0.0), min(rise, 0.0)))
+
+
 @pytest.mark.parametrize("ground", GROUNDS)
 def test_hills_and_stairs_are_walked_upright_as_ever(ground: str) -> None:
     """What can be walked on upright is, key by key, whatever Up could make of it."""
@@ -202,5 +220,7 @@ LIMITS: dict[str, dict[str, float]] = {
     "pipe": {"drift": 0.009, "sink": 0.006, "turn": 40.0},
     # 0.0159, of a bone that only just touches the edge, 0.0058 and 33°.
     "box": {"drift": 0.025, "sink": 0.009, "turn": 45.0},
+    "cliff up": {"drift": 0.03, "sink": 0.03, "turn": 57.0},
+    "cliff down": {"drift": 0.03, "sink": 0.03, "turn": 57.0},
 }
 """Arm lengths and degrees. On the floor it is 0.0055, 0.0023 and 19°."""

@@ -76,7 +76,11 @@ def test_a_cliff_that_breaks_the_walk_is_told_as_the_referee_sees_it(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setitem(GROUNDS, "cliff", lambda x, y: 2.0 * (x > 0.0) + 0.0 * y)
-    scene = build("walk", "cliff")
+
+    def upright(settings: Any) -> None:
+        settings.ground.up = "WORLD"
+
+    scene = build("walk", "cliff", change=upright)
     told = {each.kind: each for each in scene.armature.octo_motion.locomotion.figures}
     played = record(scene.armature, moments(scene.start, scene.end))
     turn = referee.turns(played)

@@ -61,12 +61,15 @@ _AT_ONCE: Final = 8192
 _STEEP: Final = np.cos(np.radians(47.0))
 """Z of a normal from which on ground is too steep to be walked on upright: at 45° Walk holds as on
 the level, at 50° arms slip by 11 % of their length, at 60° footholds are 0.12 out of reach …"""
-_LONG: Final = 1.25
-"""… and arm lengths of route for which it is, at least: what is less is a step."""
+_LONG: Final = 0.7
+"""… and arm lengths of route for which it is, at least: what is less is a step. Upright, arms slip by
+half their length up and down a cliff of one arm, and are a tenth of it in the ground."""
 _ASIDE: Final = 3e-3
 """Arm lengths off the ground from which on a route tells on which side of it it is."""
 _DOWN: Final = np.cos(np.radians(65.0))
 """Z of a sheet's normal down to which it may be a wall or an overhang, negative."""
+_BOTH: Final = 2.0
+"""How many times farther it is off on the side that faces do not show, at least, if it is there."""
 _CLOSED: Final = 0.1
 """Share of a mesh's area that its area vectors sum up to at most, if it has an inside."""
 _STRAIGHT: Final = 0.99
@@ -356,7 +359,8 @@ def _side(
     nearest, normals = (np.array(each) for each in zip(*found, strict=True))
     off = dot(places - nearest, normals)
     if np.abs(off).max() > _ASIDE * reach:
-        return 1.0 if off.sum() >= 0.0 else -1.0
+        # What is on both cuts corners of the ground.
+        return -1.0 if off.sum() < 0.0 and off.min() < -_BOTH * off.max() else 1.0
     areas = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     closed = np.linalg.norm(areas.sum(axis=0)) < _CLOSED * np.linalg.norm(areas, axis=1).sum()
     # A sheet that looks down was laid the wrong way round.
