@@ -236,14 +236,23 @@ def sample_ground(
     else:
         coarse = _near_path(grid, path, reach)
         heights = _beneath(triangles, grid, coarse(path[:, 2]) + headroom, lowest, highest)
-    _check_below(path[needed], heights[_nearest(grid, path[needed])], gap)
+    # How wide a gap is, is to be known as well as the ground is.
+    walked = _close(path[needed], spacing) if gap > 0.0 else path[needed]
+    _check_below(walked, heights[_nearest(grid, walked)], gap)
     if bare is not None:
         return HeightField(grid.origin, spacing, np.where(np.isfinite(heights), heights, bare))
-    gaps = _gaps(np.isfinite(heights), int(0.5 * gap / spacing))
+    gaps = _gaps(np.isfinite(heights), math.ceil(0.5 * gap / spacing))
     if gaps is None:
         return single or HeightField(grid.origin, spacing, _filled(heights))
     filled = single.heights if single is not None else _filled(heights)
     return HeightField(grid.origin, grid.spacing, filled, gaps)
+
+
+def _close(path: Floats, spacing: float) -> Floats:
+    """Points (m, 3) of a path (n, 3), no farther apart than a spacing."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    at = np.linspace(0.0, along[-1], int(np.ceil(along[-1] / spacing)) + 1)
+    return np.stack([np.interp(at, along, each) for each in path.T], axis=1)
 
 
 def _check_below(path: Floats, heights: Floats, gap: float) -> None:

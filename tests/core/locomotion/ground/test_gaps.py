@@ -21,10 +21,10 @@ def strip(start: float, end: float) -> Floats:
     return np.array([[a, b, c], [a, c, d]])
 
 
-def sampled(width: float, gap: float) -> HeightField:
+def sampled(width: float, gap: float, way: Floats = WAY) -> HeightField:
     triangles = np.concatenate([strip(-3.0, -0.5 * width), strip(0.5 * width, 3.0)])
-    needed = np.ones(len(WAY), dtype=bool)
-    return sample_ground(triangles, WAY, needed, reach=1.0, spacing=0.02, headroom=1.0, gap=gap)
+    needed = np.ones(len(way), dtype=bool)
+    return sample_ground(triangles, way, needed, reach=1.0, spacing=0.02, headroom=1.0, gap=gap)
 
 
 def test_a_gap_is_known_and_the_ground_goes_on_level_over_it() -> None:
@@ -35,6 +35,13 @@ def test_a_gap_is_known_and_the_ground_goes_on_level_over_it() -> None:
     assert ground.is_gap(across)[inside].all()
     assert not ground.is_gap(across)[outside].any()
     assert ground.height(across) == pytest.approx(0.0)
+
+
+def test_a_gap_is_as_wide_as_the_ground_says_however_far_apart_the_points_of_the_way_are() -> None:
+    for places in (WAY, WAY[::4], WAY[[0, -1]]):
+        assert sampled(0.42, 0.45, places).is_gap(np.zeros(2))
+        with pytest.raises(GroundError, match="leaves the ground"):
+            sampled(0.5, 0.45, places)
 
 
 def test_what_lies_beyond_the_ground_is_no_gap() -> None:
