@@ -126,6 +126,23 @@ def test_on_a_wall_or_ceiling_it_walks_as_on_the_floor(
     assert apart.max() < 0.1
 
 
+@pytest.mark.parametrize(("up", "steep"), [("WORLD", 60.0), ("AUTO", 60.0), ("WORLD", 40.0)])
+def test_ground_that_cannot_be_walked_on_upright_is_told(
+    up: str, steep: float, capfd: pytest.CaptureFixture[str]
+) -> None:
+    rise = np.tan(np.radians(steep))
+    ground = _sheet(
+        lambda u, v: np.stack([8 * u - 4, 8 * v - 4, rise * (8 * u - 4)], axis=-1), 9, 9
+    )
+    way = _way(np.array([[-0.4, 0.0, -0.4 * rise], [0.4, 0.0, 0.4 * rise]]))
+    bpy.ops.octo_motion.add_octopus()
+    settings: Any = bpy.context.object.octo_motion.locomotion
+    settings.route, settings.ground.object, settings.ground.up = way, ground, up
+    bpy.ops.octo_motion.generate_locomotion()
+    told = "by 0.87 arm lengths within half of one: upright, arms slide there. Set Up to By Itself."
+    assert (told in capfd.readouterr().out) == (up == "WORLD" and steep == 60.0)
+
+
 def _rock(direction: Floats) -> Floats:
     x, y, z = np.moveaxis(direction, -1, 0)
     size = 1.0 + 0.05 * np.sin(3.0 * x + 1.0) + 0.05 * np.sin(4.0 * y) * np.cos(3.0 * z)

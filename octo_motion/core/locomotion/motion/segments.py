@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 
 from ...content_cache import ContentCache, content_key
+from ...phrases import phrase
 from ...rotations import Floats, rotate
 from ...smoothing import least_jerk
 from ..clearance import afloat
@@ -84,6 +85,13 @@ _LOWEST: Final = 0.12
 """Arm lengths that a body is above its ground at least."""
 _GAP: Final = 1.0
 """Arm lengths without ground that are stepped over."""
+_CLIMBED: Final = 0.55
+"""Arm lengths that ground may rise or fall within half of one, for arms to hold on upright: 48°, or
+a step of a little more than the highest that is walked well."""
+_UPRIGHT: Final = (
+    "The ground rises or falls by {rise:.2g} arm lengths within half of one: upright, arms slide "
+    "there. Set Up to By Itself."
+)
 _PATH_STEP: Final = 0.1
 """Arm lengths between the points of the route that the ground is looked for under."""
 _AROUND_STRIDES: Final = 1.0
@@ -368,7 +376,19 @@ def _ground(
         ground = sample_ground(triangles, path, inside, **sizes, content=content)
         return ground, ground.rounded(_EDGE * reach)
 
-    return _grounds.get(content_key(content, path, inside, sizes), sampled), job.warnings
+    found = _grounds.get(content_key(content, path, inside, sizes), sampled)
+    told = _too_steep(found[0], path[inside], reach) if job.stance.up == "WORLD" else ()
+    return found, (*told, *job.warnings)
+
+
+def _too_steep(ground: Ground, path: Floats, reach: float) -> tuple[str, ...]:
+    """What there is to say of a way (n, 3) that is walked upright, though none can hold there."""
+    height = ground.height(path)
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1))])
+    rise = np.abs(np.interp(along + 0.5 * reach, along, height) - height).max() / reach
+    if rise <= _CLIMBED:
+        return ()
+    return (phrase(_UPRIGHT, rise=float(rise)),)
 
 
 # --- Segments: one for each gait along the way, and how arms go over from one to the next ---------
