@@ -236,9 +236,7 @@ def sample_ground(
     else:
         coarse = _near_path(grid, path, reach)
         heights = _beneath(triangles, grid, coarse(path[:, 2]) + headroom, lowest, highest)
-    # How wide a gap is, is to be known as well as the ground is.
-    walked = _close(path[needed], spacing) if gap > 0.0 else path[needed]
-    _check_below(walked, heights[_nearest(grid, walked)], gap)
+    _check_below(path[needed], grid, heights, gap)
     if bare is not None:
         return HeightField(grid.origin, spacing, np.where(np.isfinite(heights), heights, bare))
     gaps = _gaps(np.isfinite(heights), math.ceil(0.5 * gap / spacing))
@@ -255,13 +253,17 @@ def _close(path: Floats, spacing: float) -> Floats:
     return np.stack([np.interp(at, along, each) for each in path.T], axis=1)
 
 
-def _check_below(path: Floats, heights: Floats, gap: float) -> None:
-    """Make sure that there is ground below points (n,) of a path, but for gaps.
+def _check_below(path: Floats, grid: HeightField, heights: Floats, gap: float) -> None:
+    """Make sure that there is ground, of heights (nx, ny), below points (n, 3) of a path, but for
+    gaps.
 
     Raises:
         GroundError: there is none.
     """
-    missing = ~np.isfinite(heights)
+    if gap > 0.0:
+        # How wide it is, is to be known as well as the ground is.
+        path = _close(path, grid.spacing)
+    missing = ~np.isfinite(heights[_nearest(grid, path)])
     left = _leaves(path, missing, gap) if np.any(missing) else None
     if left is not None:
         share = 100.0 * left / max(len(path) - 1, 1)

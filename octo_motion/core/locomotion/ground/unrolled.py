@@ -62,8 +62,8 @@ _STEEP: Final = np.cos(np.radians(47.0))
 """Z of a normal from which on ground is too steep to be walked on upright: at 45° Walk holds as on
 the level, at 50° arms slip by 11 % of their length, at 60° footholds are 0.12 out of reach …"""
 _LONG: Final = 0.7
-"""… and arm lengths of route for which it is, at least: what is less is a step. Upright, arms slip by
-half their length up and down a cliff of one arm, and are a tenth of it in the ground."""
+"""… and arm lengths of route for which it is, at least: what is less is a step. Upright, arms slip
+by half their length up and down a cliff of one arm, and are a tenth of it in the ground."""
 _ASIDE: Final = 3e-3
 """Arm lengths off the ground from which on a route tells on which side of it it is."""
 _DOWN: Final = np.cos(np.radians(65.0))
