@@ -30,6 +30,8 @@ class Web:
     """Times its length at rest that an edge has."""
     inside_out: Worst
     """Share of the upper sheet's area at rest whose faces look to the lower sheet."""
+    turned_over: float
+    """The mean of that share over all moments."""
 
 
 def web(recording: Recording, surface: Surface, length: float) -> Web:
@@ -39,7 +41,8 @@ def web(recording: Recording, surface: Surface, length: float) -> Web:
         Worst.of(np.stack(each, axis=-1), recording.frames, [""] * len(found))
         for each in zip(*found, strict=True)
     ]
-    return Web(*worst)
+    mean = max(float(np.mean(through)) for _, _, through in found)
+    return Web(*worst, turned_over=mean)
 
 
 def _of(skin: Skin, surface: Surface, length: float) -> tuple[Floats, Floats, Floats]:

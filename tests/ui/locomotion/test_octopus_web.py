@@ -51,9 +51,10 @@ def played(setup: str, ground: str) -> tuple[Web, float]:
     return web(recording, Surface.of(scene.ground), length), through.share
 
 
-_INSIDE_OUT = {"walk": 0.08, "hurry": 0.25, "prowl": 0.08, "settle": 0.035}
-"""Share of the web's area that may be inside out where arms cross a neighbour: it is 4.2 %, 12 %,
-3.8 % and 1.8 % of it, at the worst moment. Elsewhere no face is."""
+_INSIDE_OUT = {"walk": (0.035, 0.0012), "hurry": (0.178, 0.0125), "prowl": (0.048, 0.0019)}
+"""Share of the web's area that may be inside out where arms cross a neighbour, at the worst moment
+and in the mean of all: 1.6 % and 0.04 % in a walk (2.3 % and 0.08 % over bumps), 12 % and 0.8 % in
+a hurry, 3.2 % and 0.13 % in a prowl. Elsewhere no face is."""
 
 
 @pytest.mark.parametrize(
@@ -68,8 +69,10 @@ def test_it_stays_whole_and_above_the_ground(
     # It never comes near the ground; creatures that swim go through grounds that they do not see.
     if setup not in {"swim", "jet_escape"}:
         assert found.deepest.value == 0.0
-    # 1.3 in a swim, 2.0 in a walk, 2.4 where it hurries.
-    assert 1.0 < found.stretch.value < 4.0
-    assert found.inside_out.value <= _INSIDE_OUT.get(setup, 0.0)
-    # Of few moments: 12 % in a walk, 14 % in a hurry, where an arm's own skin goes through another.
-    assert through < 0.3
+    # 1.3 in a swim, 2.0 in a walk, 2.3 where it hurries.
+    assert 1.0 < found.stretch.value < 3.5
+    worst, mean = _INSIDE_OUT.get(setup, (0.0, 0.0))
+    assert found.inside_out.value <= worst
+    assert found.turned_over <= mean
+    # Of few moments: 6 % in a walk, 14 % in a hurry, where an arm's own skin goes through another.
+    assert through < 0.22
