@@ -33,6 +33,7 @@ VERSIONS = {
     "bpy-4.5": ("3.11",),
     "lint": ("3.13", "3.11"),
     "mujoco": ("3.13", "3.11"),
+    "elastica": ("3.13", "3.11"),
     "farm": ("3.13", "3.11"),
 }
 """The Pythons that environments are made with."""

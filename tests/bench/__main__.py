@@ -11,7 +11,8 @@ A first word measures one thing: "splicing" the quality of splices, "copies" how
 on rest poses, units and file formats, "live" how fast a walk follows a change, "apart" how far arms
 pass through each other, "keys" how many keys *Few* leaves of each gait, "device" how well the loop
 at the devices keeps time, "posing" how long a step of the plastic puppet takes, "follow" how long
-follow-through takes. Their own --help tells more.
+follow-through takes, "reaching" how an arm reaches beside one that PyElastica simulates. Their own
+--help tells more.
 
 --write measures all that docs/speed.md, docs/quality.md and docs/apart.md show, or the sections
 that are named after it, keeps it in tests/bench/figures.json and writes it into the pages. Recorded
@@ -39,6 +40,7 @@ _APART: Final = {
     "keys": "few_keys",
     "device": "device_loop",
     "follow": "follow_through",
+    "reaching": "reaching",
 }
 """First words, and the modules that they run."""
 _SHORT: Final = ("comparison",)

@@ -27,6 +27,7 @@ from tests.bench import (
     device_loop,
     live_speed,
     posing,
+    reaching,
     splice_speed,
 )
 from tests.bench.comparison import Options
@@ -96,6 +97,7 @@ SECTIONS: Final[dict[str, Section]] = {
     "floods": Section(lambda _: device_loop.flooded(5.0), device_loop.text_flooded),
     "kills": Section(lambda _: device_loop.killed(_KILLS), device_loop.text_killed),
     "fuzz": Section(lambda _: device_loop.fuzzed(_INPUTS), device_loop.text_fuzzed),
+    "reaching": Section(lambda _: reaching.beside(), reaching.text, reaching.said),
     "apart": Section(lambda _: apart.measure(), apart.text, apart.said),
     "apart_turn": Section(
         lambda _: apart.measure(("walk", "hurry", "prowl", "crawl", "settle"), "turn", 3),
