@@ -53,7 +53,7 @@ experiment: ## splice a throw and a punch onto a walk at two timings and draw it
 papers: ## make the papers' experiments and figures again in build/papers; ARGS=--quick to try it
 	@.ci/dev papers $(ARGS)
 
-setups: ## show every set-up on bumpy ground in build/setups; ARGS=--film for videos too
+setups: ## show every set-up on bumpy ground in build/setups; ARGS="--film --before" for videos, and without the body's life too
 	@.ci/dev setups $(ARGS)
 
 texts: ## print the texts that a language lacks, as a catalogue to fill in; ARGS=fr_FR

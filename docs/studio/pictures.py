@@ -189,6 +189,7 @@ PICTURES: Final[dict[str, Callable[[], Pixels]]] = {
     "swim_route": along_route(shots.SWIM, 5),
     "ground": grounds.sheet,
     "setups": setups.gallery,
+    "alive": setups.alive,
     "rig": rig,
     "body": body,
     "gaits": gaits,

@@ -11,7 +11,7 @@ import os
 import sys
 import time
 from pathlib import Path
-from typing import Final, TextIO
+from typing import Any, Final, TextIO
 
 import bpy
 import contact_sheet
@@ -24,6 +24,7 @@ from stage import Pixels, Points
 
 import octo_motion
 from octo_motion.ui.locomotion.operators import setups as ours
+from octo_motion.ui.locomotion.settings.body import BEFORE, BEFORE_BESIDE
 
 BUMPS: Final = 0.3
 """Height of the bumps from valley to top, in arm lengths."""
@@ -45,6 +46,8 @@ _IMPORTERS: Final = {
     ".glb": lambda path: bpy.ops.import_scene.gltf(filepath=path),
     ".fbx": lambda path: bpy.ops.import_scene.fbx(filepath=path),
 }
+_PHASES: Final = 3
+"""Pictures of a body before, and as many after, beside each other."""
 _BACKGROUND: Final = (0.06, 0.06, 0.065)
 
 
@@ -55,6 +58,11 @@ def main() -> None:
     parser.add_argument("names", nargs="*", help=f"of {', '.join(names)}; all if none is named")
     parser.add_argument("--folder", type=Path, default=Path("build/setups"), help="where they go")
     parser.add_argument("--film", action="store_true", help="videos as well")
+    parser.add_argument(
+        "--before",
+        action="store_true",
+        help="also with a body that does nothing by itself: no web, arms even",
+    )
     parser.add_argument(
         "--rig", type=Path, help="a .blend, .glb or .fbx file with another creature"
     )
@@ -79,14 +87,17 @@ def main() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     octo_motion.register()
     try:
-        for name in arguments.names or names:
+        wanted = [(name, True) for name in arguments.names or names]
+        if arguments.before:
+            wanted = [(name, alive) for name, _ in wanted for alive in (False, True)]
+        for name, alive in wanted:
             start = time.perf_counter()
-            performance = perform(name, rig, arguments.armature)
+            performance = perform(name, rig, arguments.armature, alive=alive)
             if arguments.thumbnails:
                 path = ours.setup_paths()[name].with_suffix(".png")
                 stage.save_pixels(_thumbnail(performance), path)
             else:
-                path = folder / f"{name}.png"
+                path = folder / (f"{name}.png" if alive else f"{name}_before.png")
                 stage.save_pixels(_sheet(performance), path)
             _tell(told, path, start)
             if arguments.film and not arguments.thumbnails:
@@ -107,20 +118,23 @@ def _tell(told: TextIO, path: Path, start: float) -> None:
     print(f"{path}  {time.perf_counter() - start:.0f} s", file=told, flush=True)
 
 
-def perform(name: str, rig: Path | None = None, armature: str = "") -> shots.Performance:
+def perform(
+    name: str, rig: Path | None = None, armature: str = "", *, alive: bool = True
+) -> shots.Performance:
     """Start from an empty file: an octopus that moves as the set-up says.
 
     Args:
         name: of the set-up.
         rig: a file with another creature, none for the octopus of the add-on.
         armature: its name, if the file has several.
+        alive: the body does something by itself, and arms are uneven; an octopus has a web.
 
     Raises:
         RuntimeError: the file has no such creature, or it cannot move so.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     if rig is None:
-        bpy.ops.octo_motion.add_octopus()
+        bpy.ops.octo_motion.add_octopus(web=alive)
         octopus = bpy.context.object
     else:
         octopus = _load(rig, armature)
@@ -130,6 +144,8 @@ def perform(name: str, rig: Path | None = None, armature: str = "") -> shots.Per
     bpy.ops.octo_motion.detect_arms()
     settings = octopus.octo_motion.locomotion
     bpy.ops.octo_motion.setup_load(name=name)
+    if not alive:
+        _still(settings)
     swims = settings.table.manner == "SWIM"
     unit = _arm_length(octopus)
     route = np.array(_RISING if swims else _ROUTE) * (unit / _LENGTH)
@@ -156,6 +172,14 @@ def perform(name: str, rig: Path | None = None, armature: str = "") -> shots.Per
     scene.frame_set(scene.frame_start)
     shot = shots.Shot(settings.gait, (), (-0.35, 0.9, -0.45), None)
     return shots.Performance(shot, octopus, settings.route, points)
+
+
+def _still(settings: Any) -> None:
+    """Leave the body to the arms that carry it, and all arms and cycles alike."""
+    for name, value in BEFORE_BESIDE.items():
+        setattr(settings, name, value)
+    for name, value in BEFORE.items():
+        setattr(settings.body, name, value)
 
 
 def _load(path: Path, name: str) -> bpy.types.Object:
@@ -244,6 +268,23 @@ def gallery() -> Pixels:
         pictures = contact_sheet.cycle_pictures(perform(name), _OBLIQUE, _CELL, _STRIP, name)
         strips.append(contact_sheet.joined([pictures]))
     return contact_sheet.joined([strips[at : at + 2] for at in range(0, len(strips), 2)])
+
+
+def alive() -> Pixels:
+    """Each set-up of our own, with a body that does nothing by itself and as it comes: three phases
+    of either to a row.
+    """
+    rows = []
+    for name in ours.ORDER:
+        if name.endswith("_as_published"):
+            continue
+        row: list[Pixels] = []
+        for lives in (False, True):
+            told = name if lives else f"{name} before"
+            performance = perform(name, alive=lives)
+            row += contact_sheet.cycle_pictures(performance, _OBLIQUE, _CELL, _PHASES, told)
+        rows.append(row)
+    return contact_sheet.joined(rows)
 
 
 def _sheet(performance: shots.Performance) -> Pixels:
