@@ -13,13 +13,14 @@ import numpy as np
 
 from octo_motion.core.locomotion.gait import Arm, GaitPoser, GaitTable
 from octo_motion.core.locomotion.ground import GroundedPoses, GroundedWalk
-from octo_motion.core.locomotion.metrics import figures, report
+from octo_motion.core.locomotion.metrics import finding_figures, report
 from octo_motion.core.locomotion.motion import MotionPlan, MotionResult, pose
 from octo_motion.core.locomotion.motion.segments import Standing, Transitions
 from octo_motion.core.locomotion.path import Route, Travel, TravelSettings, plan_travel
 from octo_motion.core.locomotion.rig import BodyFrame
 from octo_motion.core.rotations import angle_between
 from octo_motion.core.skeleton import Skeleton
+from octo_motion.core.steps import finished
 from octo_motion.ui.locomotion.writing import Shot, Summary
 from octo_motion.ui.locomotion.writing import prepare as shot_of
 
@@ -164,7 +165,7 @@ class Made:
     def depth_of_bones(self) -> float:
         """Arm lengths that joints are below the ground; the figure DEPTH is that of the skin."""
         assert self.result.measured is not None
-        found = figures(replace(self.result.measured, skins=None))
+        found = finished(finding_figures(replace(self.result.measured, skins=None)))
         return next(each.value for each in found if each.kind == "DEPTH")
 
     @property

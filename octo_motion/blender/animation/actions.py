@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 from collections import deque
 from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from operator import itemgetter
 from typing import Any, Final
@@ -48,6 +49,9 @@ _TRAVELS: Final = 1e-4
 
 _BEING_WRITTEN: Final = ""
 """Fingerprint of an action while it gets its keys."""
+_KINDS: Final = ("interpolation", "handle_left_type", "handle_right_type", "type")
+_PLACES: Final = ("co", "handle_left", "handle_right")
+"""All that is kept of a key."""
 CHANNELS_AT_ONCE: Final = 12
 """How many get their keys at one step, while Blender goes on: with 700 frames that is a millisecond
 or two."""
@@ -191,7 +195,7 @@ def write_action(
     times = _checked(frames, channels)
     action = generated_action(obj, name, previous, replaceable=replaceable)
     channelbag = _dense_channelbag(action)
-    known = filled.digests if filled is not None and filled.name == action.name else {}
+    known = filled.curves if filled is not None and filled.name == action.name else {}
     written = _Written()
     deque(written.filling(channelbag, times, channels, known, automatic=automatic), maxlen=0)
     _set_range(action, channelbag, times, repeats=repeats)
@@ -537,13 +541,13 @@ class _Written:
         channelbag: bpy.types.ActionChannelbag,
         times: np.ndarray,
         channels: Sequence[Channel],
-        filled: Mapping[tuple[str, int], bytes],
+        filled: Mapping[tuple[str, int], _Filled],
         *,
         automatic: bool,
     ) -> Iterator[None]:
         """Make the curves what the channels say, in steps. Curves that are there already are filled
-        anew, so that their colours, selection and place in the editors stay; of those that were
-        filled with keys on all frames already the hashes are known.
+        anew, so that their colours, selection and place in the editors stay, but for those that
+        were so already.
         """
         digests, handles = self.digests, self.handles
         curves = {(curve.data_path, curve.array_index): curve for curve in channelbag.fcurves}
@@ -553,28 +557,30 @@ class _Written:
             for component in range(channel.values.shape[1]):
                 place = (channel.data_path, component)
                 curve = curves.pop(place, None)
-                if (
-                    curve is not None
-                    and place in filled
-                    and len(curve.keyframe_points) == len(times)
-                ):
-                    digests[place] = filled[place]
-                    curve.update()
-                    continue
+                there = filled.get(place)
                 if curve is None:
                     curve = channelbag.fcurves.new(channel.data_path, index=component)
+                if there is not None and len(curve.keyframe_points) != there.count:
+                    there = None
                 group = curve.group
                 # Dense and reduced keys are grouped in their own ways; else the artist's stays.
                 if group is None or (
                     group.name != channel.group
-                    and _has_own_handles(curve) != (channel.keys is not None)
+                    and (_has_own_handles(curve) if there is None else there.had_own_handles)
+                    != (channel.keys is not None)
                 ):
                     curve.group = group_named(channelbag, channel.group)
-                if channel.keys is not None:
-                    digests[place], handles[place] = _write_bezier(curve, channel.keys, component)
-                else:
-                    points[:, 1] = channel.values[:, component]
-                    digests[place] = _write_dense(curve, points, kinds)
+                if there is None:
+                    if channel.keys is not None:
+                        there = _fill_bezier(curve, channel.keys, component)
+                    else:
+                        points[:, 1] = channel.values[:, component]
+                        there = _fill_dense(curve, points, kinds)
+                if not there.told:
+                    there = _tell(curve, there, channel)
+                digests[place] = there.digest
+                if there.handles is not None:
+                    handles[place] = there.handles
             yield
         for curve in curves.values():
             # Its group goes with the last of its curves.
@@ -583,7 +589,7 @@ class _Written:
 
 def _dense_keys(times: np.ndarray, *, automatic: bool) -> tuple[np.ndarray, np.ndarray]:
     """Keys (keys, 2) on all frames whose values are to be filled in, and what they are, as of
-    :func:`_write_dense`.
+    :func:`_fill_dense`.
     """
     points = np.empty((len(times), 2), dtype=np.float32)
     points[:, 0] = times
@@ -596,11 +602,28 @@ def _dense_keys(times: np.ndarray, *, automatic: bool) -> tuple[np.ndarray, np.n
     return points, kinds
 
 
+@dataclass(frozen=True, eq=False)
+class _Filled:
+    """What is known of a curve that has its keys."""
+
+    count: int
+    """Of keys."""
+    digest: bytes
+    """The hash of them: to read them back takes longer than to write them."""
+    handles: np.ndarray | None = None
+    """(keys, 4) as Blender has them, of one with handles of its own."""
+    had_own_handles: bool = False
+    """Whether it was one of these before."""
+    told: bool = True
+    """Whether Blender has heard of them."""
+
+
 class HalfWritten:
     """A generated action that gets its keys a few curves at a time, while Blender goes on.
 
-    Nothing of that is seen: Blender looks at keys anew only once it is told of them. Until all are
-    written the action counts as one that nobody has edited, also after a step back.
+    Of curves that keep their number of keys nothing is seen before all are written, for Blender
+    looks at keys anew only once it is told of them. Until then the action counts as one that nobody
+    has edited, also after a step back.
 
     Args:
         action: one that may be replaced.
@@ -608,34 +631,42 @@ class HalfWritten:
 
     def __init__(self, action: bpy.types.Action) -> None:
         self.name = action.name
-        self.digests: dict[tuple[str, int], bytes] = {}
-        """The hash of the keys of each curve that is filled, by its data path and index."""
-        self._before: dict[tuple[str, int], np.ndarray] = {}
+        self.curves: dict[tuple[str, int], _Filled] = {}
+        """Those that are filled, by data path and index."""
+        self._before: dict[tuple[str, int], dict[str, np.ndarray]] = {}
         self._fingerprint: str = action[MARK]["fingerprint"]
         action[MARK]["fingerprint"] = _BEING_WRITTEN
 
     def filling(
-        self, frames: Floats, channels: Sequence[Channel], *, automatic: bool
+        self, frames: Floats, channels: Sequence[Channel], *, automatic: bool, seen: bool
     ) -> Iterator[None]:
-        """Fill curves that have as many keys of the same kind already, in steps; others are left as
-        they are.
+        """Fill the curves that are there, in steps. What would be seen of it waits, unless the
+        motion is nearly the same: then that may be.
         """
-        self.digests.clear()
+        self.curves.clear()
         times = _checked(frames, channels)
         points, kinds = _dense_keys(times, automatic=automatic)
-        dense = [each for each in channels if each.keys is None]
-        for start in range(0, len(dense), CHANNELS_AT_ONCE):
+        for start in range(0, len(channels), CHANNELS_AT_ONCE):
             yield
             curves = self._curves()
-            for channel in dense[start : start + CHANNELS_AT_ONCE]:
+            for channel in channels[start : start + CHANNELS_AT_ONCE]:
                 for component in range(channel.values.shape[1]):
                     place = channel.data_path, component
-                    if (curve := curves.get(place)) is None or not _alike(curve, kinds):
+                    count = len(times) if channel.keys is None else len(channel.keys)
+                    if (curve := curves.get(place)) is None:
                         continue
-                    self._before.setdefault(place, key_points(curve))
-                    points[:, 1] = channel.values[:, component]
-                    curve.keyframe_points.foreach_set("co", points.ravel())
-                    self.digests[place] = _keys_digest(points, kinds)
+                    if not seen and len(curve.keyframe_points) != count:
+                        continue
+                    if place not in self._before:
+                        self._before[place] = _read_keys(curve)
+                    own = _are_own_handles(self._before[place])
+                    if channel.keys is not None:
+                        found = _fill_bezier(curve, channel.keys, component)
+                    else:
+                        points[:, 1] = channel.values[:, component]
+                        found = _fill_dense(curve, points, kinds)
+                    found = replace(found, had_own_handles=own)
+                    self.curves[place] = _tell(curve, found, channel) if seen else found
 
     def give_back(self) -> None:
         """Let the action be as it was."""
@@ -643,10 +674,12 @@ class HalfWritten:
         if action is None or not self._before:
             return
         curves = self._curves()
-        for place, points in self._before.items():
+        for place, keys in self._before.items():
             curve = curves.get(place)
-            if curve is not None and len(curve.keyframe_points) == len(points):
-                curve.keyframe_points.foreach_set("co", points.ravel())
+            if curve is not None:
+                _resize(curve, len(keys["type"]))
+                for name, values in keys.items():
+                    curve.keyframe_points.foreach_set(name, values.ravel())
                 curve.update()
         action[MARK]["fingerprint"] = self._fingerprint
 
@@ -681,8 +714,8 @@ def add_cycles(curve: bpy.types.FCurve) -> None:
         cycles.mode_before = cycles.mode_after = "REPEAT_OFFSET"
 
 
-def _write_dense(curve: bpy.types.FCurve, points: np.ndarray, kinds: np.ndarray) -> bytes:
-    """Fill a curve with a key on each frame; the hash of its keys.
+def _fill_dense(curve: bpy.types.FCurve, points: np.ndarray, kinds: np.ndarray) -> _Filled:
+    """Fill a curve with a key on each frame.
 
     Args:
         curve: all keys of one that has as many are of one kind, as nobody has edited them.
@@ -706,8 +739,14 @@ def _write_dense(curve: bpy.types.FCurve, points: np.ndarray, kinds: np.ndarray)
         if automatic:
             keys.foreach_set("handle_left_type", kinds[2])
             keys.foreach_set("handle_right_type", kinds[2])
-    curve.update()
-    return _keys_digest(points, kinds)
+    return _Filled(len(points), _keys_digest(points, kinds), told=False)
+
+
+def _resize(curve: bpy.types.FCurve, count: int) -> None:
+    keys = curve.keyframe_points
+    if len(keys) != count:
+        keys.clear()
+        keys.add(count)
 
 
 def _alike(curve: bpy.types.FCurve, kinds: np.ndarray) -> bool:
@@ -724,14 +763,10 @@ def _alike(curve: bpy.types.FCurve, kinds: np.ndarray) -> bool:
     )
 
 
-def _write_bezier(
-    curve: bpy.types.FCurve, keys: BezierKeys, component: int
-) -> tuple[bytes, np.ndarray]:
-    """Fill a curve with Bézier keys; the hash of its keys, and its handles as Blender has them."""
+def _fill_bezier(curve: bpy.types.FCurve, keys: BezierKeys, component: int) -> _Filled:
+    """Fill a curve with Bézier keys."""
+    _resize(curve, len(keys))
     points = curve.keyframe_points
-    if len(points) != len(keys):
-        points.clear()
-        points.add(len(keys))
     coordinates = np.column_stack([keys.frames, keys.values[:, component]])
     bezier = _filled(len(keys), "interpolation", "BEZIER")
     generated = _filled(len(keys), "type", "GENERATED")
@@ -744,8 +779,26 @@ def _write_bezier(
     points.foreach_set("handle_right_type", kinds)
     points.foreach_set("handle_left", np.ascontiguousarray(keys.left[:, component]).ravel())
     points.foreach_set("handle_right", np.ascontiguousarray(keys.right[:, component]).ravel())
+    digest = _keys_digest(coordinates, np.stack([bezier, generated]))
+    return _Filled(len(keys), digest, told=False)
+
+
+def _tell(curve: bpy.types.FCurve, filled: _Filled, channel: Channel) -> _Filled:
+    """Let Blender look at a curve's keys anew, and put its handles right."""
     curve.update()
-    return _keys_digest(coordinates, np.stack([bezier, generated])), _handles(curve)
+    handles = _handles(curve) if channel.keys is not None else None
+    return replace(filled, handles=handles, told=True)
+
+
+def _read_keys(curve: bpy.types.FCurve) -> dict[str, np.ndarray]:
+    """All that a generated curve's keys are, by name."""
+    keys, count = curve.keyframe_points, len(curve.keyframe_points)
+    found = {name: np.empty(count, dtype=_ENUMERATION) for name in _KINDS}
+    # Types before places: handles that are automatic go where Blender has them.
+    found |= {name: np.empty((count, 2), dtype=np.float32) for name in _PLACES}
+    for name, values in found.items():
+        keys.foreach_get(name, values.ravel())
+    return found
 
 
 def _kind_of(keys: bpy.types.FCurveKeyframePoints) -> tuple[str, str]:
@@ -759,13 +812,19 @@ def _kind_of(keys: bpy.types.FCurveKeyframePoints) -> tuple[str, str]:
 def _has_own_handles(curve: bpy.types.FCurve) -> bool:
     """Whether it has handles that matter and were set, rather than left to Blender."""
     keys = curve.keyframe_points
-    kinds = np.empty((3, len(keys)), dtype=_ENUMERATION)
-    keys.foreach_get("interpolation", kinds[0])
-    if not (kinds[0] == enum_value("interpolation", "BEZIER")).any():
+    kinds = {name: np.empty(len(keys), dtype=_ENUMERATION) for name in _KINDS[:3]}
+    for name, values in kinds.items():
+        keys.foreach_get(name, values)
+    return _are_own_handles(kinds)
+
+
+def _are_own_handles(keys: Mapping[str, np.ndarray]) -> bool:
+    """The same of keys as of :func:`_read_keys`."""
+    interpolation, *handles = (keys[name] for name in _KINDS[:3])
+    if not (interpolation == enum_value("interpolation", "BEZIER")).any():
         return False
-    keys.foreach_get("handle_left_type", kinds[1])
-    keys.foreach_get("handle_right_type", kinds[2])
-    return bool((kinds[1:] != enum_value("handle_left_type", "AUTO")).any())
+    automatic = enum_value("handle_left_type", "AUTO")
+    return any(bool((each != automatic).any()) for each in handles)
 
 
 def _handles(curve: bpy.types.FCurve) -> np.ndarray:

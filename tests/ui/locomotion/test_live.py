@@ -572,6 +572,54 @@ def test_an_action_that_is_half_written_is_given_back_where_the_next_one_cannot_
     assert not actions.is_edited(action_of(slowly))
 
 
+def few_on_their_way(armature: Any) -> dict[Any, Any]:
+    """Go on until a motion with a key on every frame is about to get few; its keys."""
+    settings_of(armature).keys = "REDUCED"
+    drag_route(armature)
+    bpy.context.view_layer.update()
+    live.run_pending()
+    live._stop(live.run_following)
+    ((name, work),) = live._state.following.items()
+    while live._state.following[name] is work:
+        live._go_on(name, 0.0)
+    dense = motion(armature)
+    as_written(armature)
+    assert motion(armature) == dense
+    return dense
+
+
+def test_few_keys_come_a_few_curves_at_a_time_too(slowly: Any) -> None:
+    few_on_their_way(slowly)
+    most, turns = 4 * actions.CHANNELS_AT_ONCE, 0
+    shown = seen(slowly)
+    while live._state.following:
+        last = motion(slowly)
+        live._go_on(slowly.name, 0.0)
+        now = motion(slowly)
+        changed = sum(now[place] != last[place] for place in now)
+        assert changed <= most or not live._state.following
+        turns += changed > 0
+        bpy.context.view_layer.update()
+        # They are the same motion.
+        assert apart(seen(slowly), shown) < 0.01
+    assert turns > 3
+    followed = motion(slowly)
+    assert not actions.is_edited(action_of(slowly))
+    generate(slowly)
+    assert motion(slowly) == followed
+
+
+def test_few_keys_that_are_half_written_are_given_back(slowly: Any) -> None:
+    dense = few_on_their_way(slowly)
+    for _ in range(3):
+        live._go_on(slowly.name, 0.0)
+    assert motion(slowly) != dense
+    settings_of(slowly).live = False
+    live.finish_following()
+    assert motion(slowly) == dense
+    assert not actions.is_edited(action_of(slowly))
+
+
 def test_a_drag_while_an_action_is_half_written_is_followed(slowly: Any) -> None:
     before = half_written(slowly)
     drag_route(slowly)

@@ -9,7 +9,7 @@ key to the next is no arc.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -218,8 +218,8 @@ class Measured:
         return _joined(self.frames, 0.5 * (self.frames[:-1] + self.frames[1:]))
 
 
-def figures(measured: Measured) -> tuple[Figure, ...]:
-    """The worst of each kind that applies, in the order of ``KINDS``.
+def finding_figures(measured: Measured) -> Generator[float, None, tuple[Figure, ...]]:
+    """The worst of each kind that applies, in the order of ``KINDS``; an arm at a step.
 
     What is played counts before what was computed, but for misses and overlaps.
     """
@@ -237,6 +237,7 @@ def figures(measured: Measured) -> tuple[Figure, ...]:
     shown = measured.as_it_plays
     turning = _turning(shown)
     for number, name in enumerate(measured.names):
+        yield 1.0
         arm = None if nowhere else _moving(measured, number)
         seen = arm if arm is None or shown is measured else _moving(shown, number)
         if len(measured.frames) > 1:

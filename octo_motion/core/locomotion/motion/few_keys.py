@@ -31,6 +31,8 @@ from ..metrics import Measured
 from ..rig import Poses, carried_by_root_bone, halfway_linear
 from .job import Creature, Tolerances
 
+_BONES_AT_ONCE: Final = 16
+"""How many are looked at in one step."""
 MANTLE_GROUP: Final = "Mantle"
 
 _TRAVEL_SHARE: Final = 0.25
@@ -197,10 +199,10 @@ def _reach(skeleton: Skeleton, arm: Arm, pivot: Floats) -> float:
 # --- What few keys play, on frames and half way between them, to be measured ----------------------
 
 
-def measure_keyed(
+def measuring_keyed(
     measured: Measured, creature: Creature, channels: Sequence[Channel], *, travels: bool
-) -> Measured:
-    """What is measured of a motion, of what its keys play in place of what was computed.
+) -> Generator[float, None, Measured]:
+    """What is measured of a motion, of what its keys play in place of what was computed; in steps.
 
     Whether arms overlap, and how far they are from their targets, stays as it was computed.
     Channels are all that the motion has, those with few keys and those with one on each frame.
@@ -209,9 +211,11 @@ def measure_keyed(
     frames = measured.frames
     halves = 0.5 * (frames[:-1] + frames[1:])
     by_path = {channel.data_path: channel for channel in channels}
-    poses, halfway = (
-        _played_poses(computed, creature, by_path, frames, times, travels=travels)
-        for computed, times in ((measured.poses, frames), (halfway_linear(measured.poses), halves))
+    poses = yield from _played_poses(
+        *(measured.poses, creature, by_path, frames, frames), travels=travels
+    )
+    halfway = yield from _played_poses(
+        *(halfway_linear(measured.poses), creature, by_path, frames, halves), travels=travels
     )
     return replace(measured, poses=poses, halfway=halfway)
 
@@ -224,8 +228,8 @@ def _played_poses(
     times: Floats,
     *,
     travels: bool,
-) -> Poses:
-    """What channels play at some times; what they do not move is as it was computed."""
+) -> Generator[float, None, Poses]:
+    """What channels play at some times, in steps; what they do not move is as it was computed."""
 
     def played(path: str) -> Floats | None:
         channel = channels.get(path)
@@ -240,6 +244,8 @@ def _played_poses(
     rotations = computed.rotations.copy()
     alongs: dict[str, Floats] = {}
     for place, name in enumerate(named):
+        if place % _BONES_AT_ONCE == 0:
+            yield 1.0
         turned = played(own.rotation_path(name))
         if turned is not None:
             rotations[:, place] = from_mode_values(turned, own.modes[name])

@@ -29,12 +29,12 @@ from ..clearance import (
 )
 from ..gait import CYCLE
 from ..ground import Ground, sample_ground
-from ..metrics import TOLD, Figure, Measured, figures
+from ..metrics import TOLD, Figure, Measured, finding_figures
 from ..path import Travel, bearings_of, plan_travel, travel_at
 from ..reaching import Carried, Reached, Travelling
 from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
 from .carrying import Carry, carried
-from .few_keys import Motion, measure_keyed, reduced
+from .few_keys import Motion, measuring_keyed, reduced
 from .handover import (
     ArmsAround,
     Handover,
@@ -202,7 +202,11 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
         channels = yield from _scaled(_reduced(plan, motion, moments, every), moving, 1.0)
         if measured is not None and plan.carry is None:
             travels = not plan.job.in_place
-            measured = measure_keyed(measured, plan.job.creature, channels, travels=travels)
+            measuring = measuring_keyed(measured, plan.job.creature, channels, travels=travels)
+            measured = yield from measuring
+            yield 1.0
+    found = (yield from finding_figures(measured)) if measured is not None else ()
+    yield 1.0
     # What is in a pose alone is on each frame, however few keys the motion has.
     further = [replace(each, values=each.values[::every]) for each in further]
     result = MotionResult(
@@ -212,7 +216,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
         arms=arms,
         carried=reached.carried if reached is not None else (),
         measured=measured,
-        figures=figures(measured) if measured is not None else (),
+        figures=found,
         warnings=(*warnings, *warnings_for_misses(plan, on_frames), *overlaps),
         notes=reached.notes if reached is not None else (),
     )

@@ -9,7 +9,7 @@ touched.
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any, Final
@@ -30,7 +30,7 @@ from ...live import SOON, Live, plays, with_parents
 from ...modal_job import Job, ModalJob
 from ...operator_base import ArmatureOperator
 from ...overlay_lines import Lines, draw_lines
-from ..reading import playing_action, previous_action
+from ..reading import forget_skins, playing_action, previous_action
 from ..settings import (
     OCTO_MOTION_PG_locomotion,
     locomotion_settings,
@@ -154,8 +154,7 @@ _ANYTHING: Final = frozenset({"RIG", "GROUND", "ELSE"})
 class _Work:
     """A motion on its way."""
 
-    motion: Following | None
-    """None while it is made as Generate does."""
+    motion: Following
     job: Job
     lines: Lines = field(default_factory=list)
     """Where it leads, to be drawn until it is there."""
@@ -192,11 +191,10 @@ class _LiveMotions(Live):
         _make(armature, locomotion_settings(armature))
 
     def show(self, armature: bpy.types.Object, work: _Work, frame: float) -> None:
-        if work.motion is not None:
-            work.motion.show(armature, frame)
+        work.motion.show(armature, frame)
 
     def give_back(self, armature: bpy.types.Object | None, work: _Work) -> None:
-        if armature is not None and work.motion is not None:
+        if armature is not None:
             work.motion.give_back(armature)
 
     def clear(self) -> None:
@@ -252,7 +250,7 @@ class _LiveMotions(Live):
     def work_on(self, armature: bpy.types.Object, work: _Work, seconds: float) -> None:
         settings = locomotion_settings(armature)
         there, motion = work.job.work(seconds), work.motion
-        if motion is not None and motion.has_news:
+        if motion.has_news:
             with self.deaf():
                 motion.tell(armature)
             work.lines = motion.lines()
@@ -263,7 +261,7 @@ class _LiveMotions(Live):
 
     def saving(self) -> None:
         for work in self.following.values():
-            if work.known and work.motion is not None:
+            if work.known:
                 work.motion.take_back()
                 work.job, work.known = Job(iter(())), False
 
@@ -427,6 +425,8 @@ def _make(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> No
             ground="GROUND" not in touched,
             all_else=not touched,
         )
+    if known is None or "RIG" in touched:
+        forget_skins()
     shown = earlier.motion if earlier is not None else None
     motion = Following(armature, bpy.context, shown, before, _state.sketches.get(name))
     _state.known[name] = replace(motion.shot)
@@ -451,7 +451,7 @@ def _is_written(
     what is to come before that, unless it is an artist's.
     """
     motion = work.motion
-    if motion is None or work.known:
+    if work.known:
         return True
     if kept := _whose(armature, settings, edited=motion.edited):
         _state.switch_off(armature, kept)
@@ -462,11 +462,8 @@ def _is_written(
     return False
 
 
-def _write(armature: bpy.types.Object, motion: Following | None) -> None:
+def _write(armature: bpy.types.Object, motion: Following) -> None:
     """Write a motion that was worked out; where Generate makes other keys of it, these follow."""
-    if motion is None:
-        del _state.following[armature.name]
-        return
     if motion.shot.rig.detection is not None:
         # What was found is what is set from now on.
         _state.known.pop(armature.name, None)
@@ -477,17 +474,7 @@ def _write(armature: bpy.types.Object, motion: Following | None) -> None:
     if motion.exact:
         del _state.following[armature.name]
     else:
-        _state.following[armature.name] = _Work(None, Job(_exactly(armature)))
-
-
-def _exactly(armature: bpy.types.Object) -> Iterator[float]:
-    """What Generate does."""
-    shot = prepare(armature, bpy.context)
-    yield 0.0
-    yield from shot.compute(brief=True)
-    if not _whose(armature, locomotion_settings(armature)):
-        with _state.deaf():
-            shot.write(unedited=True)
+        _state.following[armature.name] = _Work(motion, Job(motion.exactly()))
 
 
 def _generated(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) -> bool:

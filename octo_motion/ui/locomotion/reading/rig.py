@@ -494,15 +494,20 @@ def read_volume(
     """The arms and the parts of the body as thick as their skin, where that is asked for.
 
     Live, it is to be quick: which bones a skin follows is then looked at anew only where the skin
-    has changed its form, and nothing is told of overlaps.
+    has changed its form (see ``forget_skins``), and nothing is told of overlaps.
     """
     if not settings.keep_apart and (live or not settings.tell_overlaps):
         return None
     if not live:
-        _known.clear()
+        forget_skins()
     rig = creature.skeleton, creature.arms, creature.body
     key = content_key(*rig, skin_key(armature))
     return _known.get(key, lambda: _read_volume(armature, *rig))
+
+
+def forget_skins() -> None:
+    """Look anew at which bones skins follow."""
+    _known.clear()
 
 
 def _read_volume(

@@ -35,7 +35,7 @@ from ....core.steps import finished
 from ...overlay_lines import Lines
 from ..reading import previous_action
 from ..settings import locomotion_settings
-from .shot import Before, Shot, prepare_anew
+from .shot import Before, Shot, prepare, prepare_anew
 
 _PATH: Final = (1.0, 0.75, 0.2, 0.9)
 _FOOTHOLD: Final = (0.3, 0.9, 0.85, 0.9)
@@ -86,18 +86,15 @@ class Following:
         self._plan: MotionPlan | None = None if self.sketch is not None else self.shot.plan()
         self.edited = False
         """Whether somebody has edited the motion before."""
+        self.exact = False
+        """Whether what is written has the keys that Generate makes."""
+        self._written = False
+        """Whether the action is what it will be, or nearly so."""
         self._few = locomotion_settings(armature).keys == "REDUCED"
         self._frame: float | None = None
         """The one in sight, none while nothing is shown."""
         self._news: tuple[float, Sequence[Glimpsed]] | None = None
         """What has come to be known of a frame."""
-
-    @property
-    def exact(self) -> bool:
-        """Whether what is written has the keys that Generate makes."""
-        plan = self._plan
-        assert plan is not None
-        return not self._few and plan.wants_subframes == plan.subframe_sampled
 
     def lines(self) -> Lines:
         """The body's way and its footholds, as lines in the world; nothing in place."""
@@ -127,7 +124,7 @@ class Following:
             OctoMotionError: something is wrong that the user can put right.
         """
         job = self.shot.job
-        if job.reaching is not None:
+        if job.reaching is not None or self._written:
             return
         self._frame = frame
         if self._plan is None:
@@ -189,7 +186,25 @@ class Following:
         yield from self._sketched(result.known)
         self.shot.result = result
         yield 1.0
-        self.shot.quarters = self.shot.passed_quarters(result)
+        self.exact = not self._few and self._plan.wants_subframes == self._plan.subframe_sampled
+        yield from self._made()
+
+    def exactly(self) -> Iterator[float]:
+        """Work out what Generate makes, where the motion nearly so is written."""
+        armature = bpy.data.objects.get((self.shot.armature, None))
+        if armature is None:
+            return
+        # Had the rig or its skin changed meanwhile, another motion would be followed by now.
+        known = self.shot.rig.detection is None and not locomotion_settings(armature).keep_pose
+        self.shot = prepare(armature, bpy.context, before=Before(self.shot, rig=known))
+        yield 0.0
+        yield from self.shot.compute(brief=True)
+        self.exact = True
+        yield from self._made()
+
+    def _made(self) -> Iterator[float]:
+        assert self.shot.result is not None
+        self.shot.quarters = self.shot.passed_quarters(self.shot.result)
         yield 1.0
         armature = bpy.data.objects.get((self.shot.armature, None))
         previous = None
@@ -224,7 +239,9 @@ class Following:
         if previous is None:
             return
         half = self.shown.half = self.shown.half or HalfWritten(previous)
-        for _ in half.filling(made.frames, made.channels, automatic=made.automatic):
+        # Few keys are as good as those on all frames, which are there by now.
+        seen = self._written
+        for _ in half.filling(made.frames, made.channels, automatic=made.automatic, seen=seen):
             yield 1.0
 
     def write(self) -> None:
@@ -232,3 +249,4 @@ class Following:
         self.shown.before.clear()
         self.shot.write(unedited=True, filled=self.shown.half)
         self.shown.half = None
+        self._written = True

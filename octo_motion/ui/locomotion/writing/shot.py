@@ -31,7 +31,13 @@ from ....blender.rig import bone_and_property, may_play_otherwise, read_skeleton
 from ....blender.scene import CARRIED, Contact, put_back, read_route, write_markers
 from ....core.errors import RouteError, WriteError
 from ....core.keyframes import Channel
-from ....core.locomotion.metrics import Figure, Played, figures, played_arm, warnings_for_figures
+from ....core.locomotion.metrics import (
+    Figure,
+    Played,
+    finding_figures,
+    played_arm,
+    warnings_for_figures,
+)
 from ....core.locomotion.motion import (
     MotionJob,
     MotionPlan,
@@ -297,7 +303,8 @@ class Shot:
             [np.concatenate([part[number][which] for part in parts]) for number in range(len(arms))]
             for which in range(2)
         )
-        self._measured(figures(replace(made.measured, played=Played(joints, orientations))))
+        played = replace(made.measured, played=Played(joints, orientations))
+        self._measured((yield from finding_figures(played)))
 
     def _measured(self, found: tuple[Figure, ...]) -> None:
         """Let these be the figures of what was written."""
@@ -570,7 +577,7 @@ def prepare(
         ),
         floor=None if live else read_floor(settings, armature, depsgraph, creature, walks=walks),
         volume=same_rig.volume
-        if same_rig
+        if same_rig and (live or same_rig.volume is not None)
         else read_volume(settings, armature, creature, live=live),
         keep_apart=settings.keep_apart,
         tell_overlaps=settings.tell_overlaps and not live,
