@@ -578,10 +578,10 @@ def few_on_their_way(armature: Any) -> dict[Any, Any]:
     drag_route(armature)
     bpy.context.view_layer.update()
     live.run_pending()
-    live._stop(live.run_following)
+    stop_timer(live.run_following)
     ((name, work),) = live._state.following.items()
     while live._state.following[name] is work:
-        live._go_on(name, 0.0)
+        live._state.go_on(name, 0.0)
     dense = motion(armature)
     as_written(armature)
     assert motion(armature) == dense
@@ -594,7 +594,7 @@ def test_few_keys_come_a_few_curves_at_a_time_too(slowly: Any) -> None:
     shown = seen(slowly)
     while live._state.following:
         last = motion(slowly)
-        live._go_on(slowly.name, 0.0)
+        live._state.go_on(slowly.name, 0.0)
         now = motion(slowly)
         changed = sum(now[place] != last[place] for place in now)
         assert changed <= most or not live._state.following
@@ -612,7 +612,7 @@ def test_few_keys_come_a_few_curves_at_a_time_too(slowly: Any) -> None:
 def test_few_keys_that_are_half_written_are_given_back(slowly: Any) -> None:
     dense = few_on_their_way(slowly)
     for _ in range(3):
-        live._go_on(slowly.name, 0.0)
+        live._state.go_on(slowly.name, 0.0)
     assert motion(slowly) != dense
     settings_of(slowly).live = False
     live.finish_following()
