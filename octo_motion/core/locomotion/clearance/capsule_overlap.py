@@ -191,8 +191,9 @@ def near(
     one_more, own = np.ones_like(squares)[..., None], squares[..., None]
     first = np.concatenate([-2.0 * middles, own, one_more], axis=2)
     second = np.concatenate([middles, one_more, own], axis=2).transpose(0, 2, 1)
-    rows = max(1, _FOR_ONE_THREAD // (first.shape[2] * len(limit)))
-    step = max(1, _AT_ONCE // limit.size)
+    rows = min(max(1, _FOR_ONE_THREAD // (first.shape[2] * len(limit))), len(limit))
+    # Never the whole of the limits at once, but some rows of them.
+    step = max(1, _AT_ONCE // (rows * len(limit)))
     found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for begin in range(0, len(middles), step):
         frames, spots, squares = _within(
