@@ -136,7 +136,8 @@ def test_ground_that_cannot_be_walked_on_upright_is_told(
     )
     way = _way(np.array([[-0.4, 0.0, -0.4 * rise], [0.4, 0.0, 0.4 * rise]]))
     bpy.ops.octo_motion.add_octopus()
-    settings: Any = bpy.context.object.octo_motion.locomotion
+    armature: Any = bpy.context.object
+    settings = armature.octo_motion.locomotion
     settings.route, settings.ground.object, settings.ground.up = way, ground, up
     bpy.ops.octo_motion.generate_locomotion()
     told = "by 0.87 arm lengths within half of one: upright, arms slide there. Set Up to By Itself."

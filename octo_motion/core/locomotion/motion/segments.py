@@ -85,9 +85,9 @@ _LOWEST: Final = 0.12
 """Arm lengths that a body is above its ground at least."""
 _GAP: Final = 1.0
 """Arm lengths without ground that are stepped over."""
-_CLIMBED: Final = 0.55
-"""Arm lengths that ground may rise or fall within half of one, for arms to hold on upright: 48°, or
-a step of a little more than the highest that is walked well."""
+_CLIMBED: Final = 0.7
+"""Arm lengths that ground may rise or fall within half of one for nothing to be said: 54°, or a
+step of as much. On a hill that rises by 0.61 at its steepest Walk holds on upright."""
 _UPRIGHT: Final = (
     "The ground rises or falls by {rise:.2g} arm lengths within half of one: upright, arms slide "
     "there. Set Up to By Itself."
