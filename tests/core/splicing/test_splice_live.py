@@ -76,18 +76,18 @@ def test_a_look_matches_no_bones_and_takes_few_frames(monkeypatch: pytest.Monkey
     ]
     looked_at = SplicePreview(base, LANDMARKS, stack, 0)
     widths: list[int] = []
-    write = splice.write_retargeted
+    write = splice.writing_retargeted
 
     def watched(
         retarget: Any, before: Any, moment: Any, turned: Any, *rest: Any, **named: Any
-    ) -> None:
+    ) -> Any:
         widths.append(len(turned))
-        write(retarget, before, moment, turned, *rest, **named)
+        return write(retarget, before, moment, turned, *rest, **named)
 
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("bones are matched again")
 
-    monkeypatch.setattr(splice, "write_retargeted", watched)
+    monkeypatch.setattr(splice, "writing_retargeted", watched)
     monkeypatch.setattr(splice, "find_retargets", refuse)
     monkeypatch.setattr(splice, "Splicer", refuse)
     for start in (100.0, 250.0, 598.0):
