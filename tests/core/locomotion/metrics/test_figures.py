@@ -15,7 +15,7 @@ from octo_motion.core.locomotion.metrics.report import (
     Figure,
     Measured,
     Played,
-    figures,
+    finding_figures,
     played_arm,
     warnings_for_figures,
 )
@@ -23,6 +23,7 @@ from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, ArmRest
 from octo_motion.core.locomotion.rig.joint_room import ArmSkin
 from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import IDENTITY, from_axis_angle, to_matrix
+from octo_motion.core.steps import finished
 
 COUNT = 5
 """Frames, from 10 on."""
@@ -69,11 +70,11 @@ def about(value: float) -> Any:
 
 
 def found(measured: Measured) -> dict[str, Figure]:
-    return {figure.kind: figure for figure in figures(measured)}
+    return {figure.kind: figure for figure in finished(finding_figures(measured))}
 
 
 def test_all_kinds_are_there_in_their_order_and_nothing_is_wrong_with_what_lies_still() -> None:
-    told = figures(still())
+    told = finished(finding_figures(still()))
     assert tuple(figure.kind for figure in told) == KINDS
     assert [figure.value for figure in told] == [0.0] * len(KINDS)
     # What is above the ground is not below it by less than nothing.
