@@ -156,7 +156,7 @@ def _places() -> dict[str, list[Place]]:
         "measure the figures": [(computing, "_measured"), (computing, "finding_figures")],
         "handles, few keys": [(computing, "_reduced"), (computing, "measuring_keyed")],
         "values of the channels": [(computing, "_motion")],
-        "write keys": [(actions, "_write_dense"), (actions, "_write_bezier")],
+        "write keys": [(actions, "_fill_dense"), (actions, "_fill_bezier"), (actions, "_tell")],
         "fingerprint of the keys": [(actions, "_keys_digest"), (actions, "_fingerprint")],
     }
 
