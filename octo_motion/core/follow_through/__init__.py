@@ -4,13 +4,11 @@
 from .chains import Chain, between, chains_of, find_loose
 from .limbs import Followed, Limbs, limbs_of, own_rotations
 from .sampling import BoneMotion, Displacement, displacement
-from .settings import MATERIALS, MEDIA, STARTS, FollowSettings
+from .settings import MATERIALS, FollowSettings
 from .simulation import STEPS, BodyCapsules, FollowJob, MovingObstacles, Simulation, follow
 
 __all__ = [
     "MATERIALS",
-    "MEDIA",
-    "STARTS",
     "STEPS",
     "BodyCapsules",
     "BoneMotion",

@@ -3,7 +3,7 @@
 
 from ..steps import own_classes
 from . import operators, panels, properties
-from .following import FollowSummary, follow_action
+from .following import follow_action
 from .operators import find_chains
 from .properties import FollowChain, OCTO_MOTION_PG_follow_through, follow_settings
 
@@ -12,7 +12,6 @@ CLASSES = (*own_classes(properties, operators), *panels.CLASSES)
 __all__ = [
     "CLASSES",
     "FollowChain",
-    "FollowSummary",
     "OCTO_MOTION_PG_follow_through",
     "find_chains",
     "follow_action",

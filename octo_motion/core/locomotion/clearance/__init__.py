@@ -4,12 +4,10 @@
 from .capsule_overlap import Capsules, Opened, Separation, measure_overlap
 from .corrections import (
     DEEP,
-    MOST_CAPSULES,
     ArmsOverGround,
     BodyVolume,
     afloat,
     eased_turns,
-    joints_that_count,
     keep_off_ground,
     largest_turns,
     lead_past,
@@ -19,7 +17,6 @@ from .corrections import (
 
 __all__ = [
     "DEEP",
-    "MOST_CAPSULES",
     "ArmsOverGround",
     "BodyVolume",
     "Capsules",
@@ -27,7 +24,6 @@ __all__ = [
     "Separation",
     "afloat",
     "eased_turns",
-    "joints_that_count",
     "keep_off_ground",
     "largest_turns",
     "lead_past",
