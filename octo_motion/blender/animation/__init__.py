@@ -47,6 +47,7 @@ from .pose_assets import make_pose_action, make_pose_asset
 from .pose_keys import Keyed, PoseKeys, mark_file_changed
 from .poses import (
     LENGTH,
+    PoseValues,
     PropertyValues,
     UnkeyedPose,
     animated_bones,
@@ -86,6 +87,7 @@ __all__ = [
     "Keyed",
     "ObjectKeys",
     "PoseKeys",
+    "PoseValues",
     "PropertyValues",
     "SplicedMotion",
     "StandIn",
