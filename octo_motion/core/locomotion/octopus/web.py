@@ -39,7 +39,7 @@ _OWN: Final = 0.15
 """Share of the way to the middle that goes with its own arm alone, at the margin."""
 _EVEN: Final = 0.56
 """How even the shares of two arms are across the rest of the web, 0 to 1."""
-_SLOWER: Final = 0.65
+_SLOWER: Final = 0.7
 """How fast the bones along the arms change in the web, of how fast they do on the arms."""
 _SOON: Final = 6.0
 """How steeply they come to that beside an arm."""
