@@ -52,6 +52,8 @@ from .stack import ClipReader, Source, is_source, local_object
 _GROUND_SPACING: Final = 0.02
 """Of the body's height: metres between samples of a ground."""
 
+_ALIKE: Final = float(np.cos(np.radians(10.0)))
+"""Cosine of how far two ways up may be apart and count as one."""
 _GROUND_REACH: Final = 0.8
 """Of the body's height, to all sides of its way."""
 
@@ -197,14 +199,16 @@ def _triangles(settings: Any) -> Floats | None:
 
 
 def _base(armature: bpy.types.Object, moving: Source | None) -> Source:
-    """By what a body is compared: its rest pose if that is one of somebody who stands, else a
-    motion of its own.
+    """By what a body is compared: its rest pose if that is one of somebody who stands, the same way
+    up as in a motion of its own, else that motion.
     """
     still = still_clip(armature, np.array([1.0]), 24.0)
     known = known_landmarks(armature, still.skeleton, None if moving is None else moving.lies)
-    if moving is None or rests_standing(still.skeleton, known.landmarks):
-        return Source(still, known.landmarks, armature.name, known.problem, known.found)
-    return moving
+    resting = Source(still, known.landmarks, armature.name, known.problem, known.found)
+    if moving is None:
+        return resting
+    stands = rests_standing(still.skeleton, known.landmarks)
+    return resting if stands and resting.up @ moving.up > _ALIKE else moving
 
 
 def _own_motion(armature: bpy.types.Object, reader: ClipReader) -> Source | None:

@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from octo_motion.blender.animation.actions import MARK
 from octo_motion.ui.splicing.retargeting import RetargetSession, file_clip
@@ -139,6 +140,39 @@ def test_nothing_pops(name: str) -> None:
         steps = np.linalg.norm(np.diff(recording.heads, axis=0), axis=-1)
         most.append(float(steps.max()))
     assert most[1] < 0.65 * most[0]
+
+
+def lean_forward_at_rest(armature: Any, degrees: float) -> None:
+    """Let the body rest as one frame of a run, and stand in its action as it rested before."""
+    bpy.ops.object.mode_set(mode="EDIT")
+    edited = armature.data.edit_bones
+    root, hips = edited["root"], edited["hips"].head.copy()
+    about = Matrix.Translation(hips) @ Matrix.Rotation(np.radians(degrees), 4, "X")
+    about @= Matrix.Translation(-hips)
+    for bone in edited:
+        if bone != root:
+            bone.transform(about)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    pose = armature.pose.bones["hips"]
+    pose.rotation_mode = "QUATERNION"
+    pose.matrix = about.inverted() @ armature.data.bones["hips"].matrix_local
+    for frame in (1, 24):
+        pose.keyframe_insert("rotation_quaternion", frame=frame)
+        pose.keyframe_insert("location", frame=frame)
+
+
+@pytest.mark.parametrize("degrees", [20.0, 40.0, 60.0])
+def test_a_body_whose_rest_pose_leans_stands_as_its_clip_does(degrees: float) -> None:
+    _, hero = walker_and("like it")
+    lean_forward_at_rest(hero, degrees)
+    OPERATORS.retarget()
+    recording = played(hero)
+    trunk = joint(recording, "neck") - joint(recording, "hips")
+    upright = trunk[:, 2] / np.linalg.norm(trunk, axis=1)
+    assert np.degrees(np.arccos(upright.min())) < 3.0
+    assert np.abs(joint(recording, "upper_arm.L") - joint(recording, "upper_arm.R"))[:, 2].max() < (
+        0.02
+    )
 
 
 def test_without_travel_the_body_stays_where_it_is() -> None:

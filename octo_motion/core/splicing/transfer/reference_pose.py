@@ -182,16 +182,17 @@ def _told_by(clip: Clip, landmarks: Landmarks) -> Clip:
 
 
 def standing_up(clip: Clip, landmarks: Landmarks) -> Floats:
-    """Which way is up (3,), armature space: that of the world where people stand along it.
-
-    A file may lie on its back: then it is how they stand on average.
+    """Which way is up (3,), armature space: that of the world, unless people stand along another
+    axis of their file, which then lies on its back. Who leans a long way stands along none.
     """
     up: Floats = clip.world[0, 2, :3] / clip.scale
     try:
         found = _Finder(clip, landmarks).upward()
     except (_NoFrameError, KeyError):
         return up
-    return up if up @ found > _UPRIGHT else found
+    axes = np.stack([up, _X, _Y, _Z, -_X, -_Y, -_Z])
+    along = axes @ found
+    return up if max(along) <= _UPRIGHT or along[0] > _UPRIGHT else axes[along.argmax()]
 
 
 def reference_doubts(clip: Clip, landmarks: Landmarks) -> list[str]:
