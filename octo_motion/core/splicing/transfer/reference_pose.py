@@ -68,8 +68,9 @@ decides where a limb is always straight."""
 _POSED: Final = np.radians(60.0)
 """How far the parts of a body rest off the reference pose when a rest pose is one to stand in."""
 
-_UPRIGHT: Final = float(np.cos(np.radians(35.0)))
-"""Cosine of how far off the vertical people may stand on average, and that is still up."""
+_UPRIGHT: Final = float(np.cos(np.radians(60.0)))
+"""Cosine of how far off the vertical people may lean on average, and that is still up: sprinters
+do by 40°, a file that lies on its back by 90°."""
 
 _DOUBTFUL: Final = 0.2
 """Weight of a moment below which nobody may be said to stand."""
@@ -182,17 +183,17 @@ def _told_by(clip: Clip, landmarks: Landmarks) -> Clip:
 
 
 def standing_up(clip: Clip, landmarks: Landmarks) -> Floats:
-    """Which way is up (3,), armature space: that of the world, unless people stand along another
-    axis of their file, which then lies on its back. Who leans a long way stands along none.
+    """Which way is up (3,), armature space: that of the world where people stand along it, lean
+    as they may.
+
+    A file may lie on its back: then it is how they stand on average.
     """
     up: Floats = clip.world[0, 2, :3] / clip.scale
     try:
         found = _Finder(clip, landmarks).upward()
     except (_NoFrameError, KeyError):
         return up
-    axes = np.stack([up, _X, _Y, _Z, -_X, -_Y, -_Z])
-    along = axes @ found
-    return up if max(along) <= _UPRIGHT or along[0] > _UPRIGHT else axes[along.argmax()]
+    return up if up @ found > _UPRIGHT else found
 
 
 def reference_doubts(clip: Clip, landmarks: Landmarks) -> list[str]:
