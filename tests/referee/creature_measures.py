@@ -255,7 +255,7 @@ def _cuts(skin: Skin, points: Floats, owners: Integers) -> set[tuple[int, int]]:
     tree = BVHTree.FromPolygons(points.tolist(), skin.faces)
     pairs = tree.overlap(tree)
     assert pairs is not None
-    found = np.array(pairs).reshape(-1, 2)
+    found = np.array(pairs, dtype=np.intp).reshape(-1, 2)
     found = found[found[:, 0] < found[:, 1]]
     found = found[owners[found[:, 0]] != owners[found[:, 1]]]
     faces = skin.faces

@@ -38,6 +38,7 @@ from ...core.splicing.transfer import (
     LimbGoal,
     MappedClip,
     WholeBody,
+    reference_doubts,
     rests_standing,
     retarget_clip,
     retargeting_clip,
@@ -213,8 +214,8 @@ def _base(armature: bpy.types.Object, moving: Source | None) -> Source:
 
 def _own_motion(armature: bpy.types.Object, reader: ClipReader) -> Source | None:
     """A motion of the armature's own, none if there is none: the one that it has for this, the
-    base of its splices, its action, or one with a slot of its name. What was retargeted tells
-    nothing of it.
+    base of its splices, one in which it stands by its name, its action, or another with a slot of
+    its name. What was retargeted tells nothing of it.
     """
     settings = splicing_settings(armature)
     own = own_action(armature)
@@ -223,10 +224,9 @@ def _own_motion(armature: bpy.types.Object, reader: ClipReader) -> Source | None
         choices.append((settings.retarget.standing, ""))
     if settings.base is not None:
         choices.append((settings.base, settings.base_slot))
-    choices += [own] if own is not None else []
     identifier = f"OB{armature.name}"
-    others = [each for each in actions_for(armature) if identifier in each.slots]
-    choices += [(each, identifier) for each in sorted(others, key=_busy)]
+    others = [(each, identifier) for each in actions_for(armature) if identifier in each.slots]
+    choices += sorted([own, *others] if own is not None else others, key=_busy)
     for action, slot in choices:
         if is_generated(action):
             continue
@@ -237,9 +237,9 @@ def _own_motion(armature: bpy.types.Object, reader: ClipReader) -> Source | None
     return None
 
 
-def _busy(action: bpy.types.Action) -> bool:
+def _busy(choice: tuple[bpy.types.Action, str]) -> bool:
     """Whether an action's name does not say that somebody stands there."""
-    name = action.name.casefold()
+    name = choice[0].name.casefold()
     return not any(word in name for word in ("idle", "stand", "pose"))
 
 
@@ -418,7 +418,9 @@ class RetargetSession:
             )
         # The first one last: that is the one that the armature has in the end.
         for name, job, clip in self._results[::-1]:
-            self.made.append(write_retargeted_clip(job, clip, name))
+            written = write_retargeted_clip(job, clip, name)
+            doubts = reference_doubts(job.source.clip, job.source.humanoid())
+            self.made.append(replace(written, warnings=(*written.warnings, *doubts)))
             bpy.data.actions[self.made[-1].action].use_fake_user = True
         self.made.reverse()
         return self

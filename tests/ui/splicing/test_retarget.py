@@ -175,6 +175,20 @@ def test_a_body_whose_rest_pose_leans_stands_as_its_clip_does(degrees: float) ->
     )
 
 
+@pytest.mark.parametrize("degrees", [0.0, 60.0])
+def test_that_a_head_turned_aside_counts_as_facing_ahead_is_told(
+    degrees: float, capfd: pytest.CaptureFixture[str]
+) -> None:
+    source, _ = walker_and("like it")
+    head = source.pose.bones["head"]
+    head.rotation_mode = "XYZ"
+    for frame in (1, LAST):
+        head.rotation_euler = (0.0, np.radians(degrees), 0.0)
+        head.keyframe_insert("rotation_euler", frame=frame)
+    OPERATORS.retarget()
+    assert ("The head is turned aside" in capfd.readouterr().out) == (degrees > 0.0)
+
+
 def test_without_travel_the_body_stays_where_it_is() -> None:
     _, hero = walker_and("short legs, wide hips")
     hero.location = (3.0, 1.0, 0.0)

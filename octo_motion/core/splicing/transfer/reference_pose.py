@@ -68,6 +68,9 @@ decides where a limb is always straight."""
 _POSED: Final = np.radians(60.0)
 """How far the parts of a body rest off the reference pose when a rest pose is one to stand in."""
 
+_TURNED: Final = np.radians(25.0)
+"""How far a head may be off its rest on average, and nobody is asked where it faces."""
+
 _UPRIGHT: Final = float(np.cos(np.radians(60.0)))
 """Cosine of how far off the vertical people may lean on average, and that is still up: sprinters
 do by 40°, a file that lies on its back by 90°."""
@@ -224,11 +227,21 @@ class _Finder:
 
     def pose(self, offsets: Floats, *, fingers: bool, palms: bool, toes: bool) -> ReferencePose:
         """The whole."""
-        made: dict[int, Floats] = {}
         hips, chest = self._bones["hips"], self._bones["chest"]
+        made = self._told_by_joints()
+        if not fingers:
+            made |= self._arms_at_rest(made)
+        if palms:
+            made |= self._palms_down()
+        made |= feet_at_rest(self._feet(conjugate(made[hips])), toes=toes)
+        self._means(made, hips, chest)
+        orientations = np.array([made[bone] for bone in range(len(self._skeleton))])
+        return ReferencePose(orientations, offsets, self._fixed())
+
+    def _told_by_joints(self) -> dict[int, Floats]:
+        """Pelvis, chest, upper and lower limbs."""
         axes = {"hips": self._pelvis_axes(), "chest": self._chest_axes()}
-        for name, each in axes.items():
-            made[self._bones[name]] = conjugate(each)
+        made = {self._bones[name]: conjugate(each) for name, each in axes.items()}
         for limb, seen_from, bends, rests in _LIMBS:
             for side, sign in (("L", 1.0), ("R", -1.0)):
                 names = [f"{each}.{side}" for each in limb]
@@ -236,14 +249,7 @@ class _Finder:
                     goal = rests * (sign, 1.0, 1.0)
                     frame = self._bones[seen_from], axes[seen_from]
                     made |= self._limb([self._bones[each] for each in names], frame, bends, goal)
-        if not fingers:
-            made |= self._arms_at_rest(made)
-        if palms:
-            made |= self._palms_down()
-        made |= feet_at_rest(self._feet(axes["hips"]), toes=toes)
-        self._means(made, hips, chest)
-        orientations = np.array([made[bone] for bone in range(len(self._skeleton))])
-        return ReferencePose(orientations, offsets, self._fixed())
+        return made
 
     def upward(self) -> Floats:
         """(3,) from feet to head of who stands."""
@@ -291,7 +297,24 @@ class _Finder:
                             landmark=spoken(names[1]),
                         )
                     )
+        if self._turns_its_head():
+            found.append(
+                "The head is turned aside or bent most of the time: what it faces then counts as "
+                "ahead. If heads come out turned, choose Rest as its Reference Pose."
+            )
         return found
+
+    def _turns_its_head(self) -> bool:
+        """Whether the head is elsewhere on average than in a rest pose of this body: no joint tells
+        where a face looks.
+        """
+        if "head" not in self._bones or not self._rests_in_a_pose(self._told_by_joints()):
+            return False
+        chest, head = self._bones["chest"], self._bones["head"]
+        between = multiply(conjugate(self._turns[:, [chest]]), self._turns[:, [head]])
+        mean = robust_rotations(between, self._standing[:, None])[0]
+        rests = self._skeleton.rest_rotations
+        return bool(angle_between(mean, multiply(conjugate(rests[chest]), rests[head])) > _TURNED)
 
     def _points_backwards(self, left: Floats) -> bool:
         """Whether toes lie behind their feet."""
