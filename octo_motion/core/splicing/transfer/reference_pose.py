@@ -21,7 +21,6 @@ from typing import Final
 
 import numpy as np
 
-from ...phrases import phrase
 from ...rotations import (
     IDENTITY,
     Floats,
@@ -38,7 +37,6 @@ from ...rotations import (
 from ...smoothing import smooth_step
 from ..clip import Clip, robust_direction, robust_rotations, usual_offsets
 from ..humanoid import Landmarks, palm_directions, palm_roots
-from .parts import spoken
 from .reference_feet import FootMoments, feet_at_rest
 
 _SAMPLES: Final = 240
@@ -58,7 +56,7 @@ _SITTING: Final = 0.05
 _RAISED: Final = 0.02
 """Weight of a leg that is raised all the time."""
 
-_BENT: Final = (np.radians(10.0), np.radians(35.0))
+BENT: Final = (np.radians(10.0), np.radians(35.0))
 """Bends of elbow and knee below which their plane says nothing, and from which it says all."""
 
 _STRAIGHT: Final = 0.03
@@ -68,15 +66,9 @@ decides where a limb is always straight."""
 _POSED: Final = np.radians(60.0)
 """How far the parts of a body rest off the reference pose when a rest pose is one to stand in."""
 
-_TURNED: Final = np.radians(25.0)
-"""How far a head may be off its rest on average, and nobody is asked where it faces."""
-
 _UPRIGHT: Final = float(np.cos(np.radians(60.0)))
 """Cosine of how far off the vertical people may lean on average, and that is still up: sprinters
 do by 40°, a file that lies on its back by 90°."""
-
-_DOUBTFUL: Final = 0.2
-"""Weight of a moment below which nobody may be said to stand."""
 
 _RIGID: Final = 2e-3
 """Of the body's size: what a joint may move against a bone and count as fixed to it."""
@@ -93,7 +85,7 @@ _SQUARE: Final = float(np.cos(np.radians(20.0)))
 """Cosine of the angle by which their line may be off that of the shoulders."""
 
 _X, _Y, _Z = np.eye(3)
-_LIMBS: Final = (
+LIMBS: Final = (
     # root, middle and end; what they are seen from; where they hang, where they rest, and the axis
     # about which they bend as they hang: a body that faces −Y, a side that is +1 on the left.
     (("upper_arm", "forearm", "hand"), "chest", -_X, _X),
@@ -166,14 +158,14 @@ def find_reference_pose(
     } <= {name for name, bone in landmarks.bones.items() if bone in clip.skeleton.index}:
         return None
     try:
-        told = _told_by(clip, landmarks)
-        finder = _Finder(told, landmarks)
+        told = told_by(clip, landmarks)
+        finder = ReferenceFinder(told, landmarks)
         return finder.pose(usual_offsets(told), fingers=fingers, palms=palms, toes=toes)
-    except _NoFrameError:
+    except NoFrameError:
         return None
 
 
-def _told_by(clip: Clip, landmarks: Landmarks) -> Clip:
+def told_by(clip: Clip, landmarks: Landmarks) -> Clip:
     """What of a clip the reference pose is found from: all, its rest pose, or one frame."""
     moment = landmarks.reference
     if moment == "":
@@ -193,25 +185,17 @@ def standing_up(clip: Clip, landmarks: Landmarks) -> Floats:
     """
     up: Floats = clip.world[0, 2, :3] / clip.scale
     try:
-        found = _Finder(clip, landmarks).upward()
-    except (_NoFrameError, KeyError):
+        found = ReferenceFinder(clip, landmarks).upward()
+    except (NoFrameError, KeyError):
         return up
     return up if up @ found > _UPRIGHT else found
 
 
-def reference_doubts(clip: Clip, landmarks: Landmarks) -> list[str]:
-    """What a clip does not tell of how its body lies: sentences that name landmarks."""
-    try:
-        return _Finder(_told_by(clip, landmarks), landmarks).doubts()
-    except (_NoFrameError, KeyError):
-        return []
-
-
-class _NoFrameError(Exception):
+class NoFrameError(Exception):
     """Joints from which left and up are to be told lie in one line."""
 
 
-class _Finder:
+class ReferenceFinder:
     """What a reference pose is found from: bones at some moments, armature space."""
 
     def __init__(self, clip: Clip, landmarks: Landmarks) -> None:
@@ -242,7 +226,7 @@ class _Finder:
         """Pelvis, chest, upper and lower limbs."""
         axes = {"hips": self._pelvis_axes(), "chest": self._chest_axes()}
         made = {self._bones[name]: conjugate(each) for name, each in axes.items()}
-        for limb, seen_from, bends, rests in _LIMBS:
+        for limb, seen_from, bends, rests in LIMBS:
             for side, sign in (("L", 1.0), ("R", -1.0)):
                 names = [f"{each}.{side}" for each in limb]
                 if all(each in self._bones for each in names):
@@ -270,86 +254,24 @@ class _Finder:
             self._standing,
         )
 
-    def doubts(self) -> list[str]:
-        """What the moments do not tell, or tell in two ways."""
-        found = []
-        if self._standing.max() < _DOUBTFUL:
-            found.append(
-                "Nobody stands here: which way is up may be wrong. Choose a frame in which the "
-                "body stands (Reference Pose, Frame)."
-            )
-        across = [
-            self._joints(f"{joint}.L") - self._joints(f"{joint}.R")
-            for joint in ("thigh", "upper_arm")
-        ]
-        if np.median(dot(*across)) < 0.0:
-            found.append("Arms and legs are on opposite sides: look at Upper Arm and Thigh.")
-        elif self._points_backwards(across[0]):
-            found.append("The toes point backwards: left and right may be exchanged (Thigh, Toes).")
-        for (root, middle, end), *_ in _LIMBS:
-            for side in "LR":
-                names = [f"{each}.{side}" for each in (root, middle, end)]
-                if all(each in self._bones for each in names) and self._always_straight(names):
-                    found.append(
-                        phrase(
-                            "The {landmark} is always straight: how the limb is turned about "
-                            "itself is as if it had swung there.",
-                            landmark=spoken(names[1]),
-                        )
-                    )
-        if self._turns_its_head():
-            found.append(
-                "The head is turned aside or bent most of the time: what it faces then counts as "
-                "ahead. If heads come out turned, choose Rest as its Reference Pose."
-            )
-        return found
-
-    def _turns_its_head(self) -> bool:
-        """Whether the head is elsewhere on average than in a rest pose of this body: no joint tells
-        where a face looks.
-        """
-        if "head" not in self._bones or not self._rests_in_a_pose(self._told_by_joints()):
-            return False
-        chest, head = self._bones["chest"], self._bones["head"]
-        between = multiply(conjugate(self._turns[:, [chest]]), self._turns[:, [head]])
-        mean = robust_rotations(between, self._standing[:, None])[0]
-        rests = self._skeleton.rest_rotations
-        return bool(angle_between(mean, multiply(conjugate(rests[chest]), rests[head])) > _TURNED)
-
-    def _points_backwards(self, left: Floats) -> bool:
-        """Whether toes lie behind their feet."""
-        forward = cross(left, self._upward)
-        ways = [
-            dot(normalized(self._joints(f"toe.{side}") - self._joints(f"foot.{side}")), forward)
-            for side in "LR"
-            if {f"toe.{side}", f"foot.{side}"} <= self._bones.keys()
-        ]
-        return bool(ways) and float(np.median(ways)) < 0.0
-
-    def _always_straight(self, names: Sequence[str]) -> bool:
-        root, middle, end = (self._joints(each) for each in names)
-        upper, lower = normalized(middle - root), normalized(end - middle)
-        bend = np.arctan2(_lengths(cross(upper, lower)), dot(upper, lower))
-        return bool(np.quantile(bend, 0.9) < _BENT[0])
-
     def _how_standing(self) -> Floats:
         """(moments,) weights: how much each says of where up is."""
         joints = self._joints
         tops, middles = self._top(), 0.5 * (joints("thigh.L") + joints("thigh.R"))
         trunks = tops - middles
-        full, told, feet = _lengths(trunks).max(), 0.0, np.zeros_like(tops)
+        full, told, feet = lengths(trunks).max(), 0.0, np.zeros_like(tops)
         for side in "LR":
             leg = [f"{each}.{side}" for each in ("thigh", "shin", "foot")]
             leg = [each for each in leg if each in self._bones]
             for upper, lower in pairwise(leg):
-                full += 0.5 * _lengths(joints(lower) - joints(upper)).mean()
+                full += 0.5 * lengths(joints(lower) - joints(upper)).mean()
             foot = joints(leg[-1])
             # By all moments at once: a walk has each leg before it and behind in turn.
             in_line = dot(normalized(trunks), normalized(joints(leg[0]) - foot))
             says = max(float(_between(in_line, _IN_LINE).mean()), _RAISED) ** 2
             feet, told = feet + says * foot, told + says
         self._upward = tops - feet / told
-        return np.maximum(_between(_lengths(self._upward) / max(full, 1e-12), _STANDING), _SITTING)
+        return np.maximum(_between(lengths(self._upward) / max(full, 1e-12), _STANDING), _SITTING)
 
     def _joints(self, landmark: str) -> Floats:
         return self._heads[:, self._bones[landmark]]
@@ -358,7 +280,7 @@ class _Finder:
         for name in ("neck", "head"):
             if name in self._bones:
                 return self._joints(name)
-        raise _NoFrameError
+        raise NoFrameError
 
     def _seen(self, bone: int, vectors: Floats) -> Floats:
         return rotate(conjugate(self._turns[:, bone]), vectors)
@@ -396,9 +318,9 @@ class _Finder:
             return shoulders
         roots = self._seen(chest, self._joints("clavicle.L") - self._joints("clavicle.R"))
         middle = np.median(roots, axis=0)
-        width = float(np.median(_lengths(left)))
+        width = float(np.median(lengths(left)))
         apart = float(np.linalg.norm(middle))
-        still = _lengths(roots - middle).max() < _RIGID * width
+        still = lengths(roots - middle).max() < _RIGID * width
         if not still or normalized(middle) @ shoulders < _SQUARE:
             return shoulders
         share = _between(np.array(apart / max(width, 1e-12)), _ROOTS)
@@ -412,8 +334,8 @@ class _Finder:
         upper = self._heads[:, middle] - self._heads[:, root]
         lower = self._heads[:, end] - self._heads[:, middle]
         normal = cross(normalized(upper), normalized(lower))
-        bend = np.arctan2(_lengths(normal), dot(normalized(upper), normalized(lower)))
-        says = _between(bend, _BENT)
+        bend = np.arctan2(lengths(normal), dot(normalized(upper), normalized(lower)))
+        says = _between(bend, BENT)
         says *= smooth_step((np.pi - bend) / np.radians(30.0))
         # Straight, it is turned as if it had swung there from hanging, on the shortest way.
         carrier = multiply(self._turns[:, frame[0]], frame[1])
@@ -515,7 +437,7 @@ class _Finder:
 
     def _fixed(self) -> dict[str, dict[str, Floats]]:
         """What never moves against chest and hips."""
-        size = 2.0 * float(_lengths(self._heads[0] - self._heads[0].mean(axis=0)).max())
+        size = 2.0 * float(lengths(self._heads[0] - self._heads[0].mean(axis=0)).max())
         found: dict[str, dict[str, Floats]] = {}
         for carrier, names in _FIXED.items():
             bone = self._bones[carrier]
@@ -528,7 +450,7 @@ class _Finder:
                     first = path[-1] if path else end
                     places = self._seen(bone, self._heads[:, first] - self._heads[:, bone])
                     place = np.median(places, axis=0)
-                    if _lengths(places - place).max() < _RIGID * size:
+                    if lengths(places - place).max() < _RIGID * size:
                         found[carrier][name] = places.mean(axis=0)
         return found
 
@@ -538,7 +460,8 @@ def _between(values: Floats, ends: tuple[float, float]) -> Floats:
     return smooth_step((values - ends[0]) / (ends[1] - ends[0]))
 
 
-def _lengths(vectors: Floats) -> Floats:
+def lengths(vectors: Floats) -> Floats:
+    """Of vectors (…, 3)."""
     return np.linalg.norm(vectors, axis=-1)
 
 
@@ -546,12 +469,12 @@ def _axes(left: Floats, up: Floats, *, first_and_second: bool = False) -> Floats
     """(4,) X along the first and Z near the second; or X along the first and Y near the second.
 
     Raises:
-        _NoFrameError: they lie in one line.
+        NoFrameError: they lie in one line.
     """
     x, other = normalized(left), normalized(up)
     other = other - np.dot(x, other) * x
     if np.linalg.norm(x) < 0.5 or np.linalg.norm(other) < 1e-3:
-        raise _NoFrameError
+        raise NoFrameError
     other = normalized(other)
     columns = [x, other, np.cross(x, other)] if first_and_second else [x, np.cross(other, x), other]
     return from_matrix(np.stack(columns, axis=-1))
