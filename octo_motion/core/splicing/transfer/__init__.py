@@ -13,7 +13,7 @@ from .parts import (
     part_bones,
     part_named,
 )
-from .reference_doubts import reference_doubts
+from .pose_doubts import reference_doubts
 from .reference_pose import ReferencePose, find_reference_pose
 from .retarget import MappedClip
 from .splice import (
