@@ -1,19 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Arms that keep clear of each other, of the body and of the ground."""
 
+from .arm_separation import DEEP, BodyVolume, lead_past, separating_arms
 from .capsule_overlap import Capsules, Opened, Separation, measure_overlap
-from .corrections import (
-    DEEP,
-    ArmsOverGround,
-    BodyVolume,
-    afloat,
-    eased_turns,
-    keep_off_ground,
-    largest_turns,
-    lead_past,
-    raise_between_frames,
-    separating_arms,
-)
+from .over_ground import ArmsOverGround, afloat, keep_off_ground, raise_between_frames
+from .turn_easing import eased_turns, largest_turns
 
 __all__ = [
     "DEEP",
