@@ -73,6 +73,12 @@ def covered(values: Floats, width: int, *, cyclic: bool = False) -> Floats:
     return blurred(widened(values, blur_reach(width), cyclic=cyclic), width, cyclic=cyclic)
 
 
+def spans(where: np.ndarray) -> list[tuple[int, int]]:
+    """Starts and ends of those frames (frames,) in a row for which it is so."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]])))
+    return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
+
+
 def _around(values: Floats, frames: int, *, cyclic: bool) -> Floats:
     """The same with so many frames more at either end."""
     count = len(values)

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats, components_first, conjugate, multiply, rotate, shortest_arc
-from ...smoothing import covered, smooth_step
+from ...smoothing import covered, smooth_step, spans
 from ..ground import Ground, raise_over_ground
 from ..rig import (
     TOLERATED,
@@ -200,7 +200,7 @@ def _best(
         return tried[0][0]
     rotations, strains = tried[0][0].rotations.copy(), tried[0][0].strains.copy()
     for number, bones in enumerate(course.bones):
-        for first, end in _runs(raised[:, number]):
+        for first, end in spans(raised[:, number]):
             moments = slice(max(first - 1, 0), end)
             depths = [deep[moments, number].max(initial=0.0) for _, deep in tried]
             turns = [
@@ -227,12 +227,6 @@ def _at_frames(halfway: Floats, *, cyclic: bool) -> Floats:
     none = np.zeros((1, *halfway.shape[1:]))
     before, after = (halfway[-1:], halfway[:1]) if cyclic else (none, none)
     return np.maximum(np.concatenate([before, halfway]), np.concatenate([halfway, after]))
-
-
-def _runs(where: np.ndarray) -> list[tuple[int, int]]:
-    """Starts and ends of frames (frames,) in a row."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]])))
-    return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
 
 
 # --- Arms that neither lie nor walk kept off the ground: those of a swimmer, and on their way there

@@ -100,10 +100,8 @@ _BRIEF: Final = 0.34
 _BORDER: Final = 1.6
 """Segments from where an arm lies over which it is less and less free to move. At 3.2 arms of Walk
 overlap by 0.28 radii instead of 0.06."""
-_RELUCTANT: Final = 3.0
-"""How much less than in proportion what is hardly free gives way: it gives way against little
-stiffness, and at 1 arms of the default walk would turn at once as they come to lie, by 15° in a
-48th of a second instead of 11°. At 10 arms of Hurry uphill overlap the more."""
+_AWAY: Final = 1.0
+"""Radians that a segment may come away from where it was, for f / (1 - f) of 1, f its freedom."""
 _STEADY: Final = 0.7
 """Share by which an arm in stance makes less way. At 0.35 arms of Hurry overlap by 0.060 radii
 instead of 0.045."""
@@ -246,8 +244,7 @@ class _Parting:
     def _in_time(self, free: Floats, kept: np.ndarray) -> Floats:
         """Freedom (frames, arms, …) that comes and goes smoothly, and is nowhere more."""
         bound = np.minimum(self._covered(np.where(kept, 1.0, 1.0 - free), brief=True), 1.0)
-        left = (1.0 - bound) / (1.0 + (_RELUCTANT - 1.0) * bound)
-        return np.where((free > 0.0) & ~kept, left, 0.0)
+        return np.where((free > 0.0) & ~kept, 1.0 - bound, 0.0)
 
     def _clearance(self) -> tuple[Floats, Floats]:
         """How high above the floor joints (frames, arms, joints) have to stay, and are above that.
@@ -360,6 +357,7 @@ class _Parting:
             goals=wanted[:, 1:] * (1.0 - pinned)[..., None],
             weights=weights,
         )
+        directions = _within(self._before[chosen], directions, free)
         self._put(chosen, self._drawn_back(chosen, directions))
 
     def _drawn_back(self, chosen: tuple[np.ndarray, ...], directions: Floats) -> Floats:
@@ -440,6 +438,19 @@ class _Parting:
         mixed = _unit(after + back * (before - after))
         mixed = np.where(back >= 1.0 - 1e-9, before, self._drawn_back(chosen, mixed))
         self._put(chosen, mixed)
+
+
+def _within(before: Floats, after: Floats, free: Floats) -> Floats:
+    """Directions (…, segments, 3) that are as far from where they were as segments are free
+    (…, segments), however often they are asked.
+
+    Each round asks anew for what the ones before have not given: against that no stiffness lasts,
+    and what is hardly free would come to turn as far as what is.
+    """
+    away = after - before
+    allowed = _AWAY * free / np.maximum(1.0 - free, _TINY)
+    share = 1.0 / np.sqrt(1.0 + (_length(away) / np.maximum(allowed, _TINY)) ** 2)
+    return _unit(before + share[..., None] * away)
 
 
 def _turns(first: Floats, second: Floats) -> Floats:

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats, conjugate, continuous, multiply, normalized
-from ...smoothing import blurred, covered
+from ...smoothing import blurred, covered, spans
 from ..rig import ArmFrames, turns_in_world
 
 _FASTEST: Final = np.radians(28.0) * 24.0
@@ -32,6 +32,13 @@ _TORN: Final = 2.0
 """Times that from which on an arm lets go rather than pop: that it holds on is no longer seen."""
 _RESTING: Final = 0.05
 """Seconds before and after a hold in which an arm stays what it is."""
+_HELPED: Final = 0.5
+"""Share of what a turn is too fast by that must be gone for bones to have been given time."""
+
+
+def fastest_turn(rate: float, per_cycle: float) -> float:
+    """Radians that a bone may turn in a frame, at so many frames a second and in a cycle."""
+    return max(_FASTEST / rate, _IN_A_CYCLE / per_cycle)
 
 
 def eased_turns(
@@ -61,7 +68,7 @@ def eased_turns(
         Rotations (moments, bones, 4), and how far each arm was changed (moments, arms), 0…1; none
         where nothing is too fast.
     """
-    most = max(_FASTEST / rate, _IN_A_CYCLE / per_cycle)
+    most = fastest_turn(rate, per_cycle)
     result, changed, start = rotations, np.zeros((len(rotations), len(arms))), 0
     fast = (turns_in_world(arms, rotations, orientations, every) > most).any(axis=0)
     for number, arm in enumerate(arms):
@@ -110,13 +117,33 @@ def _eased(
     return frames, whole
 
 
-def largest_turns(
-    arms: Sequence[ArmFrames], rotations: Floats, orientations: Floats, every: int
+def where_it_helps(
+    arms: Sequence[ArmFrames],
+    before: Floats,
+    eased: Floats,
+    orientations: Floats,
+    *,
+    most: float,
+    every: int = 1,
 ) -> Floats:
-    """Radians (arms,) by which some bone of each turns from a frame to the next at most."""
-    turned = turns_in_world(arms, rotations, orientations, every).max(axis=0, initial=0.0)
-    starts = np.cumsum([0, *(len(arm.bones) for arm in arms[:-1])])
-    return np.maximum.reduceat(turned, starts)
+    """Rotations (moments, bones, 4), eased from what they were before; as before wherever an arm
+    still turns by nearly as much more than the most radians as it did. Arguments are as of
+    :func:`eased_turns`.
+
+    Each stretch of an arm counts by itself: what cannot be helped at one place of a long way
+    spoils nothing at another.
+    """
+    then, now = (turns_in_world(arms, each, orientations, every) for each in (before, eased))
+    result, start = eased.copy(), 0
+    for arm in arms:
+        own = slice(start, start + len(arm.bones))
+        start = own.stop
+        for first, end in spans((before[:, own] != eased[:, own]).any(axis=(1, 2))):
+            part = slice(max(first - every, 0), end)
+            was, left = (each[part, own].max(initial=0.0) - most for each in (then, now))
+            if left > max(_HELPED * was, 0.0):
+                result[first:end, own] = before[first:end, own]
+    return result
 
 
 def _faster(frames: Floats, most: float, every: int) -> np.ndarray:

@@ -21,11 +21,12 @@ from ..clearance import (
     ArmsOverGround,
     Opened,
     eased_turns,
+    fastest_turn,
     keep_off_ground,
-    largest_turns,
     lead_past,
     raise_between_frames,
     separating_arms,
+    where_it_helps,
 )
 from ..gait import CYCLE
 from ..ground import Ground, sample_ground
@@ -108,8 +109,6 @@ _BONES_AT_ONCE: Final = 24_000
 """Bones times frames of one step of the work: some tens of megabytes."""
 _KEPT: Final = 2**25 - 2**16
 """Bytes of the largest arrays whose memory is kept: glibc keeps that of none beyond 2**25."""
-_HELPED: Final = 0.85
-"""Share of the largest turn that is left, at most, where bones were given time."""
 _TURNS: Final = 4
 """Of one step where Blender goes on meanwhile; the numbers are the same."""
 _FLOOR_AROUND: Final = 2.5
@@ -682,10 +681,10 @@ def _take_time(
     if arms.rotations is before:
         return
     # Where it is no help, it is no good either.
-    then, now = (largest_turns(frames, each, going[1], every) for each in (before, arms.rotations))
-    for arm in np.flatnonzero(now > _HELPED * then):
-        bones = plan.segments.bones_of[arm]
-        arms.rotations[:, bones] = before[:, bones]
+    most = fastest_turn(rate, per_cycle)
+    arms.rotations = where_it_helps(
+        frames, before, arms.rotations, going[1], most=most, every=every
+    )
 
 
 def _trail(plan: MotionPlan, trailing: Trailing, posed: _Posed) -> Steps[None]:
