@@ -59,6 +59,13 @@ def unrest(arms: dict[str, Any]) -> float:
     return min(found)
 
 
+def changed(even: dict[str, Any], uneven: dict[str, Any]) -> float:
+    """Arm lengths by which joints are elsewhere than with all arms alike, root mean square."""
+    length = np.linalg.norm(np.diff(next(iter(even.values()))[0], axis=0), axis=1).sum()
+    apart = np.concatenate([np.ravel(uneven[arm] - even[arm]) for arm in even])
+    return float(np.sqrt(3.0 * np.mean(apart**2)) / length)
+
+
 def test_swimming_arms_are_no_mirror_images_and_no_stroke_is_the_one_before(octopus: Any) -> None:
     even, uneven = (played(octopus, "swim", amount) for amount in (0.0, 1.0))
     # Nothing but the body's own drawing together tells strokes apart.
@@ -68,10 +75,13 @@ def test_swimming_arms_are_no_mirror_images_and_no_stroke_is_the_one_before(octo
     assert unrest(uneven) > 0.02  # 0.036: what changes least
 
 
-def test_resting_arms_differ_from_cycle_to_cycle(octopus: Any) -> None:
+def test_resting_arms_differ_from_cycle_to_cycle_as_much_as_swimming_ones(octopus: Any) -> None:
     even, uneven = (played(octopus, "idle", amount) for amount in (0.0, 1.0))
     assert unrest(even) < 1e-5
-    assert unrest(uneven) > 0.003  # 0.006
+    # Where, when and how bent they take hold, too: 0.037 where it was 0.006.
+    assert unrest(uneven) > 0.018
+    # 0.024.
+    assert changed(even, uneven) > 0.012
 
 
 @pytest.mark.parametrize("setup", ["swim", "idle"])

@@ -25,6 +25,7 @@ from .table import (
     gait_to_json,
     renamed_gait,
 )
+from .variation import UnevenHolds
 
 __all__ = [
     "ANGLES",
@@ -38,6 +39,7 @@ __all__ = [
     "GaitSettings",
     "GaitTable",
     "RoughGaitPoser",
+    "UnevenHolds",
     "bone_twists",
     "check_gait",
     "close_group",

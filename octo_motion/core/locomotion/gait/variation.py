@@ -7,6 +7,7 @@ All of it hangs on seed, cycle and arm alone, never on which frames are asked fo
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -20,6 +21,18 @@ _LATE: Final = 0.02 * CYCLE, 0.003 * CYCLE
 and in a single cycle. More of the latter would make strokes hasty …"""
 _UNLIKE: Final = np.radians([[3.0, 3.0], [4.0, 4.0], [7.0, 7.0]])
 """(links, 2) … and by how much their head and pitch differ: how far they reach, and curl."""
+_OWN_TIME: Final = 0.015
+"""Cycles by which arms that rest on the ground in place are ahead or late at most: always …"""
+_TIME: Final = 0.01
+"""… and in a single cycle."""
+_ASIDE: Final = np.radians(5.0)
+"""How far to either side of where it would, such an arm takes hold at most …"""
+_REACH: Final = 0.02
+"""… and how many arm lengths nearer or farther. At 0.05 they come off before they let go, and drift
+by 1 % of their length instead of 0.45 %."""
+_MORE_BENT: Final = np.radians(8.0)
+"""By how much it lies there bent otherwise. At 20° Idle turns by 11.2° in a frame instead of 9.6°.
+"""
 
 
 def unevenness(
@@ -57,6 +70,37 @@ def unevenness(
     added[..., :2] = there[..., 1:].reshape(*phases.shape, *_UNLIKE.shape) * _UNLIKE
     always = [_stream(seed, 0, arm, 2).uniform(-amount, amount) for arm in arms]
     return phases + _LATE[0] * np.array(always) + _LATE[1] * there[..., 0], added
+
+
+@dataclass(frozen=True)
+class UnevenHolds:
+    """How arms that rest on the ground in place differ in what they do there: from each other, and
+    from cycle to cycle.
+    """
+
+    amount: float
+    """1 for as much as is natural."""
+    seed: int
+    periods: int | Sequence[int]
+    """Cycles after which it comes again, of all arms or of each."""
+
+    def of(self, arms: Sequence[int], cycles: np.ndarray) -> Floats:
+        """Of some arms in cycles of some numbers (cycles,): by how many cycles they take hold late,
+        radians anticlockwise and arm lengths by which they do so beside and beyond their usual
+        place, and radians by which they lie more bent, (4, arms, cycles).
+        """
+        periods = np.broadcast_to(np.asarray(self.periods), (max(arms) + 1,))[list(arms)]
+        numbers = np.where(periods > 0, cycles[:, None] % np.maximum(periods, 1), cycles[:, None])
+        drawn = np.array(
+            [
+                [_stream(self.seed, cycle, arm, 3).uniform(-1.0, 1.0, 4) for cycle in own]
+                for arm, own in zip(arms, numbers.T.tolist(), strict=True)
+            ]
+        )
+        always = [_stream(self.seed, 0, arm, 4).uniform(-1.0, 1.0) for arm in arms]
+        late, aside, beyond, bent = np.moveaxis(drawn, 2, 0)
+        late = _TIME * late + _OWN_TIME * np.array(always)[:, None]
+        return self.amount * np.stack([late, _ASIDE * aside, _REACH * beyond, _MORE_BENT * bent])
 
 
 def variation(

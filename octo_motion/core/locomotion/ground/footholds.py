@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats, rotate, rotate_in_plane
-from ..gait import CYCLE
+from ..gait import CYCLE, UnevenHolds
 from ..path import Line, values_along
 from .arm_curves import laid
 from .contact_timing import ContactTiming
@@ -141,6 +141,7 @@ def spots(
     *,
     aim: Floats,
     away: Floats,
+    farther: Floats,
 ) -> tuple[Floats, Floats]:
     """Footholds as far out as an arm holds on with ease, and near enough to be kept.
 
@@ -153,6 +154,7 @@ def spots(
         aim: (arms, cycles, 2) unit vectors in which the arms are to touch, world.
         away: (arms, cycles) metres from the root, seen from above, at which they are to do so if
             they can; nan for where it is easy.
+        farther: (arms, cycles) metres by which it is to be beyond that.
 
     Returns:
         Metres (arms, cycles) from the root, seen from above, and half of how long the stance lasts
@@ -163,7 +165,7 @@ def spots(
     distance, half, short = np.zeros(shape), np.zeros(shape), np.full(shape, np.inf)
     undecided = np.ones(shape, dtype=bool)
     for lasts, passing in passings:
-        found, lack = _spot(ground, reach, passing, aim, away)
+        found, lack = _spot(ground, reach, passing, aim, (away, farther))
         better = undecided & (lack < short)
         distance = np.where(better, found, distance)
         half = np.where(better, lasts, half)
@@ -190,10 +192,10 @@ def _reach(limbs: Limbs, settings: StanceSettings) -> _Reach:
 
 
 def _spot(
-    ground: Ground, reach: _Reach, passing: Passing, aim: Floats, away: Floats
+    ground: Ground, reach: _Reach, passing: Passing, aim: Floats, wanted: tuple[Floats, Floats]
 ) -> tuple[Floats, Floats]:
     """Distances from the root, and metres that these are wrong by, both (arms, cycles)."""
-    roots, nearest = passing.middle, _NEAREST * reach.whole
+    (away, farther), roots, nearest = wanted, passing.middle, _NEAREST * reach.whole
     # As it is seen from the root half way through: where it is then, and as the hold begins, as it
     # ends, and as peeling begins.
     seen = np.stack([roots, passing.touch_down, passing.lift_off, passing.peeling])
@@ -216,7 +218,7 @@ def _spot(
         lacking = np.where(inside < 0.0, reach.whole, least - largest)
         lack, farthest = np.maximum(lacking.max(axis=0), 0.0), largest.min(axis=0)
         easily = np.sqrt(np.maximum(easy, nearest**2))
-        limit = np.minimum(np.where(np.isnan(away), easily, away), farthest)
+        limit = np.minimum(np.where(np.isnan(away), easily, away) + farther, farthest)
         # What is too near looks bad, but what is too far slides.
         found = np.minimum(np.maximum(limit, least), np.maximum(farthest, _CLOSEST * reach.whole))
     return found, lack
@@ -407,6 +409,7 @@ def lay(
     contact_overrides: Sequence[ContactOverride] = (),
     seed: int = 0,
     cyclic: bool = False,
+    uneven: UnevenHolds | None = None,
 ) -> Footholds:
     """Lay all footholds of some arms.
 
@@ -420,23 +423,26 @@ def lay(
         cycles: the first and the last that are wanted.
         contact_overrides: the artist's; of arms by their number in the body.
         seed: of the small differences from step to step.
-        cyclic: whether there are none, so that each cycle is like the one before.
+        cyclic: whether there are none, so that each cycle is like the one before …
+        uneven: … but for what holds differ by in place.
     """
     first, last = cycles
     numbers = np.arange(first, last + 1)
     shape = len(limbs.arms), len(numbers)
     overridden = _overridden(limbs, shape, first, contact_overrides)
+    differing = np.zeros((4, *shape)) if uneven is None else uneven.of(limbs.arms, numbers)
+    shift = overridden.shift + differing[0]
     roots = _RootPath(limbs, line, timing, numbers, middle / CYCLE)
-    curl = _curls(limbs, 0 * numbers if cyclic else numbers, seed)
+    curl = _curls(limbs, 0 * numbers if cyclic else numbers, seed) + differing[3]
     joint = limbs.touching(settings.planted)
-    spot, lie, half = _places(roots, overridden.shift, ground, settings)
-    spot, half, firm = _over_gaps(roots, (overridden.shift, half), ground, settings, (spot, lie))
+    spot, lie, half = _places(roots, shift, ground, settings, differing[1:3])
+    spot, half, firm = _over_gaps(roots, (shift, half), ground, settings, (spot, lie))
     spot = np.where(overridden.moved[..., None], overridden.places, spot)
     heading = np.where(overridden.turned, overridden.headings, np.arctan2(lie[..., 1], lie[..., 0]))
     # As if they were round.
     skins = np.broadcast_to(limbs.radii[joint:].T[:, None], (*shape, len(limbs.radii) - joint))
     joints = laid(limbs, ground, joint, skins=skins, spot=spot, heading=heading, curl=curl)
-    touch_down, lift_off, middles = _times(overridden.shift, half)
+    touch_down, lift_off, middles = _times(shift, half)
     at_touch_down, at_lift_off = roots.at(np.stack([touch_down, lift_off]))[0]
     return Footholds(
         first=first,
@@ -500,10 +506,11 @@ class _RootPath:
 
 
 def _places(
-    path: _RootPath, shift: Floats, ground: Ground, settings: StanceSettings
+    path: _RootPath, shift: Floats, ground: Ground, settings: StanceSettings, beside: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Where arms touch (arms, cycles, 3), which way they lie (arms, cycles, 2), and half of how
-    long they do (arms, cycles), in cycles; stances (arms, cycles) are shifted by so many cycles.
+    long they do (arms, cycles), in cycles; stances (arms, cycles) are shifted by so many cycles,
+    and places are beside the usual ones by radians and arm lengths (2, arms, cycles).
     """
     limbs = path.limbs
     turns, away = path.timing.aims(limbs.arms, path.numbers)
@@ -512,13 +519,14 @@ def _places(
     aim, lie = (rotate_in_plane(each, turns) for each in _ahead(limbs, rotations))
     sizes = np.stack([limbs.reach[-1], limbs.reach[-1] - limbs.reach[joint]], axis=-1)
     aside, farther = settled(ground, roots, aim, lie, away, sizes=sizes)
+    aside, farther = aside + beside[0], farther + beside[1] * limbs.reach[-1][:, None]
     aim, lie = rotate_in_plane(aim, aside), rotate_in_plane(lie, aside)
     # One after the other, for the first will do for nearly all.
     passings = (
         (times[2], Passing(roots, path.at(shift + np.stack(times))[0]))
         for times in stance_times(path.duty(settings, shift))
     )
-    distance, half = spots(limbs, ground, settings, passings, aim=aim, away=away + farther)
+    distance, half = spots(limbs, ground, settings, passings, aim=aim, away=away, farther=farther)
     spot = roots.copy()
     spot[..., :2] += distance[..., None] * aim
     return spot, lie, half * _unturned(path, shift, half)

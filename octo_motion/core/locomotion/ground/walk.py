@@ -12,7 +12,7 @@ import numpy as np
 from ...rotations import Floats, components_first, conjugate, from_matrix, multiply, rotate
 from ...skeleton import Skeleton
 from ...steps import finished
-from ..gait import CYCLE, Build, GaitPoser, bone_twists
+from ..gait import CYCLE, Build, GaitPoser, UnevenHolds, bone_twists
 from ..path import Line, values_along
 from ..rig import ArmSkin, BodyFrame, Facing, rotate_bones, sucker_sides
 from .arm_curves import Seen, skin_below
@@ -419,6 +419,10 @@ class GroundedWalk:
         sides = [sucker_sides(skeleton, arm.bones, down) for arm in poser.arms]
         # Where nothing varies at random, the seed does not matter.
         seed = poser.settings.seed if any(poser.settings.variation) else 0
+        uneven = None
+        if cyclic and poser.settings.uneven > 0.0:
+            periods = self._timing.cycle_period or poser.settings.period
+            uneven = UnevenHolds(poser.settings.uneven, poser.settings.seed, periods)
         self._ends = np.cumsum([0] + [len(arm.bones) for arm in poser.arms])
         self._parts: list[WalkPart] = []
         for build in poser.builds:
@@ -439,6 +443,7 @@ class GroundedWalk:
                     contact_overrides=contact_overrides,
                     seed=seed,
                     cyclic=cyclic,
+                    uneven=uneven,
                 )
                 self._parts.append(WalkPart(poser, ground, settings, sides, own, limbs, footholds))
         if not self._are_round(skins):
