@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Several pieces of work at once, by as many threads as there are processors for this process.
+
+What takes long is numpy on large arrays, and numpy lets other threads go on meanwhile. The pieces
+are the same however many threads there are, each is worked out by one of them, and none reads what
+another writes: so the numbers are the same to the last bit. No thread outlives the call that has
+begun it, so Blender never goes on while Python works elsewhere.
+
+Who gives each process a processor of its own, as farms do (``taskset``, ``sched_setaffinity``, a
+container's set of processors), gets one thread.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Generator, Sequence
+from contextvars import copy_context
+from itertools import count
+from threading import Thread
+from typing import Any, Final, TypeVar
+
+_Outcome = TypeVar("_Outcome")
+_Item = TypeVar("_Item")
+
+_MOST: Final = 4
+"""Threads at once: beyond, they mostly wait for the interpreter and for memory."""
+_TURN: Final = 0.004
+"""Seconds after which a thread that works in steps takes no further one before all have met."""
+
+
+def thread_count() -> int:
+    """How many threads work at once."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    # Windows and macOS do not say which processors are a process's own.
+    own = len(affinity(0)) if affinity is not None else os.cpu_count() or 1
+    return min(own, _MOST)
+
+
+def each_of(work: Callable[[_Item], _Outcome], items: Sequence[_Item]) -> list[_Outcome]:
+    """What work makes of each item, in their order.
+
+    Raises:
+        Exception: what the work of the first item that fails has raised.
+    """
+    threads = min(thread_count(), len(items))
+    if threads < 2:
+        return [work(item) for item in items]
+    found: dict[int, _Outcome] = {}
+    failed: dict[int, BaseException] = {}
+    numbers = count()
+
+    def run() -> None:
+        while not failed and (number := next(numbers)) < len(items):
+            try:
+                found[number] = work(items[number])
+            except BaseException as error:  # noqa: BLE001 - raised again by whoever has asked
+                failed[number] = error
+
+    others = [Thread(target=copy_context().run, args=(run,)) for _ in range(threads - 1)]
+    for other in others:
+        other.start()
+    run()
+    for other in others:
+        other.join()
+    if failed:
+        raise failed[min(failed)]
+    return [found[number] for number in range(len(items))]
+
+
+def abreast(
+    works: Sequence[Generator[Any, None, _Outcome]],
+) -> Generator[None, None, list[_Outcome]]:
+    """What comes of works in steps, in their order; a yield each time that all threads have met.
+
+    Raises:
+        Exception: what the first work that fails has raised.
+    """
+    found: dict[int, _Outcome] = {}
+    threads = thread_count()
+
+    def turn(number: int) -> None:
+        until = time.perf_counter() + (_TURN if threads > 1 else 0.0)
+        try:
+            next(works[number])
+            while time.perf_counter() < until:
+                next(works[number])
+        except StopIteration as last:
+            found[number] = last.value
+
+    while True:
+        open_ones = [number for number in range(len(works)) if number not in found]
+        if not open_ones:
+            return [found[number] for number in range(len(works))]
+        each_of(turn, open_ones[:threads])
+        yield
+
+
+def pieces(length: int, most: int) -> list[slice]:
+    """Slices of a row of that length that follow one another, of so many items at most each."""
+    return [slice(start, min(start + most, length)) for start in range(0, length, most)]
