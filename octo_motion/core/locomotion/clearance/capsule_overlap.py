@@ -11,22 +11,28 @@ from one place, no pose can keep these apart.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
+from ...content_cache import part_of
 from ...rotations import Floats
 from ...rotations.components_first import dot
 from ...smoothing import smooth_step
+from ...threads import each_of, pieces
+
+_Made = TypeVar("_Made")
 
 _NO_LENGTH: Final = 1e-30
 """Squares of lengths that are none, however small a rig's unit makes its bones."""
 _PARALLEL: Final = 1e-10
 """Square of the sine of the angle between two segments that are as good as parallel."""
-_AT_ONCE: Final = 250_000
+_AT_ONCE: Final = 500_000
 """Distances that are looked at in one go: what the processor keeps at hand."""
+_ROWS_AT_ONCE: Final = 8_000
+"""Pairs of capsules of which all is worked out in one go, likewise."""
 _FOR_ONE_THREAD: Final = 100_000
 """Multiplications of a product of matrices for which numpy's linear algebra wakes no threads:
 beside other programs these wait for each other a hundred times as long as the product takes."""
@@ -88,15 +94,19 @@ def measure_overlap(chains: Sequence[Capsules], still: Sequence[Capsules] = ()) 
     if not chains:
         return Separation(np.zeros(0), ())
     parts = parts_of(every)
-    one, other = pairs_of(every, len(chains))
+    pairs = pairs_of(every, len(chains))
+
+    def overlapping(found: Near) -> tuple[np.ndarray, ...]:
+        depths = _depths(parts, (found.frame, found.one, found.other))
+        deep = depths > 0.0
+        return found.frame[deep], found.one[deep], found.other[deep], depths[deep]
+
     depths = np.zeros(parts.starts.shape[1])
-    number, pair, _ = near(parts, one, other)
-    found = _depths(parts, (number, one[pair], other[pair]))
-    touching = found > 0.0
-    number, pair, found = number[touching], pair[touching], found[touching]
-    np.maximum.at(depths, number, found)
+    found = near(Middles.of(parts), pairs, overlapping)
+    number, one, other, deep = joined(found, (np.intp, np.intp, np.intp, np.float64))
+    np.maximum.at(depths, number, deep)
     owner = parts.owner
-    return Separation(depths, _pairs(every, owner[one[pair]], owner[other[pair]], number, found))
+    return Separation(depths, _pairs(every, owner[one], owner[other], number, deep))
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,84 +168,139 @@ def pairs_of(chains: Sequence[Capsules], moving: int) -> tuple[np.ndarray, np.nd
     return one[apart], other[apart]
 
 
+@dataclass(frozen=True, eq=False)
+class Middles:
+    """Where the capsules of all chains are, roughly."""
+
+    places: np.ndarray
+    """(frames, capsules, 3) their middles, single precision, around that of all."""
+    squares: np.ndarray
+    """(frames, capsules) of how far away from there that is, likewise."""
+    reach: Floats
+    """(capsules,) half of the length that each has at most."""
+    wide: Floats
+    """(capsules,) their larger radius."""
+    owner: np.ndarray
+    """(capsules,) number of each one's chain; chains come one after the other."""
+
+    @classmethod
+    def of(cls, parts: Parts) -> Middles:
+        """Of capsules at all frames."""
+        places = np.empty((*parts.starts.shape[1:], 3), dtype=np.float32)
+        whole = np.zeros(parts.starts.shape[1:])
+        for axis, (start, end) in enumerate(zip(parts.starts, parts.ends, strict=True)):
+            middle = 0.5 * (start + end)
+            # Around its middle a scene's rounding in single precision is least.
+            places[..., axis] = middle - middle.mean()
+            whole += (end - start) ** 2
+        squares = np.einsum("fsi,fsi->fs", places, places)
+        reach = 0.5 * np.sqrt(whole.max(axis=0))
+        return cls(places, squares, reach, np.maximum(*parts.radii), parts.owner)
+
+
+@dataclass(frozen=True, eq=False)
+class Near:
+    """Capsules whose bounding spheres touch."""
+
+    frame: np.ndarray
+    """(n,) numbers of frames …"""
+    one: np.ndarray
+    """… of capsules …"""
+    other: np.ndarray
+    """… and of others, which come after them."""
+    least: Floats
+    """How far apart their middle lines are at least."""
+
+
 def near(
-    parts: Parts, one: np.ndarray, other: np.ndarray, margin: float = 0.0, slack: float = 0.0
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Numbers of frames and of pairs whose bounding spheres touch, and how far apart their middle
-    lines are at least.
-
-    Of capsules ``one`` (pairs,) and ``other`` (pairs,), those count that are no further apart than
-    a margin in radii, and a slack in the unit of the joints.
-    """
-    if len(one) == 0:
-        none = np.zeros(0, dtype=np.intp)
-        return none, none, np.zeros(0)
-    middles = np.empty((*parts.starts.shape[1:], 3), dtype=np.float32)
-    whole = np.zeros(parts.starts.shape[1:])
-    for axis, (start, end) in enumerate(zip(parts.starts, parts.ends, strict=True)):
-        middle = 0.5 * (start + end)
-        # Around its middle a scene's rounding in single precision is least.
-        middles[..., axis] = middle - middle.mean()
-        whole += (end - start) ** 2
-    longest = 0.5 * np.sqrt(whole.max(axis=0))
-    squares = np.einsum("fsi,fsi->fs", middles, middles)
-    rounding = 1e-6 * squares.max()
-    apart = longest[one] + longest[other]
-    size = longest + (1.0 + margin) * np.maximum(*parts.radii) + 0.5 * slack
-    limit = np.full((len(longest), len(longest)), -np.inf, dtype=np.float32)
-    limit[one, other] = ((size[one] + size[other]) * (1.0 + _ROUNDED)) ** 2 + rounding
-    place = np.full(limit.shape, -1)
-    place[one, other] = np.arange(len(one))
-    place = place.ravel()
-    # |a − b|² = |a|² + |b|² − 2 a · b, all of it in one product.
-    one_more, own = np.ones_like(squares)[..., None], squares[..., None]
-    first = np.concatenate([-2.0 * middles, own, one_more], axis=2)
-    second = np.concatenate([middles, one_more, own], axis=2).transpose(0, 2, 1)
-    rows = min(max(1, _FOR_ONE_THREAD // (first.shape[2] * len(limit))), len(limit))
-    # Never the whole of the limits at once, but some rows of them.
-    step = max(1, _AT_ONCE // (rows * len(limit)))
-    found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-    for begin in range(0, len(middles), step):
-        frames, spots, squares = _within(
-            first[begin : begin + step], second[begin : begin + step], limit, rows
-        )
-        pair = place[spots]
-        square = np.maximum(squares - rounding, 0.0)
-        found.append((frames + begin, pair, (1.0 - _ROUNDED) * np.sqrt(square) - apart[pair]))
-    frames, pairs, least = (np.concatenate(each) for each in zip(*found, strict=True))
-    return frames, pairs, least
-
-
-def _within(
-    first: np.ndarray, second: np.ndarray, limit: np.ndarray, rows: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where the products of matrices (frames, capsules, n) and (frames, n, capsules) are within
-    their limits (capsules, capsules).
-
-    Those before the diagonal are not asked for.
+    middles: Middles,
+    pairs: tuple[np.ndarray, np.ndarray],
+    make: Callable[[Near], _Made],
+    *,
+    margin: float = 0.0,
+    slack: float = 0.0,
+    anew: np.ndarray | None = None,
+) -> list[_Made]:
+    """What is made of capsules whose bounding spheres touch, a piece of them at a time.
 
     Args:
-        first: the one.
-        second: the other.
-        limit: of each product.
-        rows: of a block that is worked out at once.
-
-    Returns:
-        Frame, place in the limits and product of each, in the order of frames and of places.
+        middles: where capsules are.
+        pairs: numbers (pairs,) and (pairs,) of those that count, the first of an earlier chain.
+        make: what is to become of some that are near; of several pieces by several threads.
+        margin: radii by which they may be apart …
+        slack: … and by which they may be so in the unit of the joints.
+        anew: (frames, chains) whose capsules are asked for, each with all others; else all are.
     """
-    found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-    for begin in range(0, len(limit), rows):
-        products = np.matmul(first[:, begin : begin + rows], second[..., begin:])
-        own = limit[begin : begin + rows, begin:]
-        # Several times faster than where a row, a column and a frame are found at once.
-        spots = np.flatnonzero(products <= own)
-        frame, spot = np.divmod(spots, own.size)
-        row, column = np.divmod(spot, own.shape[1])
-        place = (row + begin) * len(limit) + column + begin
-        found.append((frame, place, products.ravel()[spots]))
-    frames, places, products = (np.concatenate(each) for each in zip(*found, strict=True))
-    order = np.argsort(frames, kind="stable")
-    return frames[order], places[order], products[order]
+    if not len(pairs[0]):
+        return []
+    owner = middles.owner
+    rounding = 1e-6 * float(middles.squares.max(initial=0.0))
+    size = middles.reach + (1.0 + margin) * middles.wide + 0.5 * slack
+    limit = np.full((len(owner), len(owner)), -np.inf, dtype=np.float32)
+    limit[pairs] = ((size[pairs[0]] + size[pairs[1]]) * (1.0 + _ROUNDED)) ** 2 + rounding
+    limit = np.maximum(limit, limit.T)
+    asked = np.ones((len(middles.places), owner.max() + 1), dtype=bool) if anew is None else anew
+    rows = max(1, _FOR_ONE_THREAD // (5 * len(owner)))
+    tasks: list[tuple[np.ndarray, slice]] = []
+    for chain in np.flatnonzero(asked.any(axis=0)):
+        first, last = np.searchsorted(owner, [chain, chain + 1]).tolist()
+        frames = np.flatnonzero(asked[:, chain])
+        for row in range(first, last, rows):
+            own = slice(row, min(row + rows, last))
+            step = max(1, _AT_ONCE // ((own.stop - row) * len(owner)))
+            tasks += [(frames[each], own) for each in pieces(len(frames), step)]
+
+    def look(task: tuple[np.ndarray, slice]) -> _Made:
+        return make(_near_to(middles, limit, asked, *task, rounding))
+
+    return each_of(look, tasks)
+
+
+def _near_to(
+    middles: Middles,
+    limit: np.ndarray,
+    asked: np.ndarray,
+    frames: np.ndarray,
+    own: slice,
+    rounding: float,
+) -> Near:
+    """What is near to some capsules of one chain, at some frames; of two chains that are both asked
+    for, the earlier one finds the other's capsules.
+    """
+    owner, chain = middles.owner, middles.owner[own.start]
+    begin = 0
+    if asked[frames, :chain].all():
+        begin = int(np.searchsorted(owner, chain + 1))
+    # |a − b|² = |a|² + |b|² − 2 a · b, all of it in one product.
+    here, there = middles.places[frames, own], middles.places[frames, begin:]
+    first = np.empty((*here.shape[:2], 5), dtype=np.float32)
+    first[..., :3], first[..., 3], first[..., 4] = -2.0 * here, middles.squares[frames, own], 1.0
+    second = np.empty((len(frames), 5, there.shape[1]), dtype=np.float32)
+    second[:, :3] = np.moveaxis(there, 1, 2)
+    second[:, 3], second[:, 4] = 1.0, middles.squares[frames, begin:]
+    products = np.matmul(first, second)
+    limits = limit[own, begin:]
+    # Several times faster than where a row, a column and a frame are found at once.
+    spots = np.flatnonzero(products <= limits)
+    place, spot = np.divmod(spots, max(limits.size, 1))
+    row, column = np.divmod(spot, max(limits.shape[1], 1))
+    row, column, frame = row + own.start, column + begin, frames[place]
+    squares = products.ravel()[spots]
+    if not begin:
+        once = (owner[column] > chain) | ~asked[frame, owner[column]]
+        row, column, frame, squares = (each[once] for each in (row, column, frame, squares))
+    distance = np.sqrt(np.maximum(squares - rounding, 0.0))
+    least = (1.0 - _ROUNDED) * distance - (middles.reach[row] + middles.reach[column])
+    return Near(frame, np.minimum(row, column), np.maximum(row, column), least)
+
+
+def joined(
+    found: Sequence[tuple[np.ndarray, ...]], kinds: tuple[type, ...]
+) -> tuple[np.ndarray, ...]:
+    """Rows of arrays, one after the other; of so many kinds if there are none."""
+    if not found:
+        return tuple(np.zeros(0, dtype=kind) for kind in kinds)
+    return tuple(np.concatenate(each) for each in zip(*found, strict=True))
 
 
 def _depths(parts: Parts, chosen: tuple[np.ndarray, np.ndarray, np.ndarray]) -> Floats:
@@ -406,15 +471,26 @@ class Touching:
             # The same before they are made unit, at rest and opened: (2, 3, chains, chains).
             both = (places, _opened_places(crowd.opened, places))
             self._apart = np.stack([each.T[:, :, None] - each.T[:, None] for each in both])
-        own = arms * (joints - 1)
+        each = joints - 1
+        own = arms * each
         # Points of the body after those of all arms: where a capsule starts and, next, ends.
-        self._body = np.stack([parts.starts[:, 0, own:], parts.ends[:, 0, own:]], axis=2)
+        body = np.stack([parts.starts[:, 0, own:], parts.ends[:, 0, own:]], axis=2)
+        self._body = body.reshape(3, -1)
+        # Where each capsule starts among the points of the first frame, and how many are between
+        # frames: of each arm there is a joint more than there are segments.
+        number = np.arange(len(self._owner))
+        self._first = np.where(
+            number < own,
+            number + number // each,
+            frames * arms * joints + 2 * (number - own),
+        )
+        self._step = np.where(number < own, arms * joints, 0)
         self._pairs = pairs_of([*self._chains(crowd.joints[:1]), *still], arms)
         self._slack = _SLACK * float(crowd.radii.mean())
         self._seen_at = crowd.joints
         self._watched = np.zeros(frames, dtype=bool)
-        frame, pair, _ = near(parts, *self._pairs)
-        self._rows = frame, self._pairs[0][pair], self._pairs[1][pair]
+        self._middles = Middles.of(parts)
+        self._rows = np.zeros((3, 0), dtype=np.intp)
 
     def _chains(self, joints: Floats) -> list[Capsules]:
         crowd = self._crowd
@@ -437,8 +513,15 @@ class Touching:
         return parts_of([*self._chains(joints), *body])
 
     def now(self) -> Touches:
-        """What touches while nobody has made way yet."""
-        return self._at(self._crowd.joints, *self._rows)
+        """What overlaps while nobody has made way yet."""
+        points = self._points(self._crowd.joints)
+
+        def overlapping(found: Near) -> Touches:
+            touches = self._at(points, np.stack([found.frame, found.one, found.other]))
+            return part_of(touches, touches.depth > 0.0)
+
+        none = self._at(points, np.zeros((3, 0), dtype=np.intp))
+        return all_of([none, *near(self._middles, self._pairs, overlapping)])
 
     def look_at(self, frames: np.ndarray, without: np.ndarray) -> None:
         """Look from now on only at what is near enough for arms that make way, in frames (frames,)
@@ -450,51 +533,65 @@ class Touching:
         kept = ~np.isin(one * len(self._owner) + other, without)
         self._pairs = one[kept], other[kept]
         self._watched, self._seen_at = frames, self._crowd.joints.copy()
-        self._rows = self._near(np.flatnonzero(frames))
+        self._rows = self._near(np.repeat(frames[:, None], self._arms, axis=1))
 
-    def _near(self, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Frame, the one and the other of what is near at some frames, where joints were seen."""
-        parts = self._parts(self._seen_at[frames])
-        place, pair, least = near(parts, *self._pairs, NEAR, self._slack)
-        rows = frames[place], self._pairs[0][pair], self._pairs[1][pair]
-        widest = np.maximum(*self._radii)
-        wide = widest[rows[1]] + widest[rows[2]]
-        # On its own side an arm has less far to be looked for.
-        chosen = np.ones(len(place), dtype=bool)
-        far = np.flatnonzero(least > (1.0 + _BESIDE * NEAR) * wide + self._slack)
-        chosen[far] = self._may_be_wrong(parts, place[far], *(each[far] for each in rows))
-        rows = rows[0][chosen], rows[1][chosen], rows[2][chosen]
-        seen = self._at(self._seen_at, *rows)
-        wrong = dot(seen.gap, seen.side) < self._slack
-        reach = (1.0 + np.where(wrong, NEAR, _BESIDE * NEAR)) * seen.wide + self._slack
-        kept = seen.distance <= reach
-        return rows[0][kept], rows[1][kept], rows[2][kept]
+    def _near(self, anew: np.ndarray) -> np.ndarray:
+        """Frame, the one and the other (3, n) of what is near to arms (frames, arms) where joints
+        were seen.
+        """
+        asked = np.zeros((len(anew), self._arms + len(self._still)), dtype=bool)
+        asked[:, : self._arms] = anew
+        points = self._points(self._seen_at)
 
-    def _may_be_wrong(
-        self, parts: Parts, place: np.ndarray, frame: np.ndarray, one: np.ndarray, other: np.ndarray
-    ) -> np.ndarray:
+        def near_enough(found: Near) -> np.ndarray:
+            wide = self._middles.wide[found.one] + self._middles.wide[found.other]
+            # On its own side an arm has less far to be looked for.
+            chosen = np.ones(len(wide), dtype=bool)
+            far = np.flatnonzero(found.least > (1.0 + _BESIDE * NEAR) * wide + self._slack)
+            rows = np.stack([found.frame, found.one, found.other])
+            chosen[far] = self._may_be_wrong(points, rows[:, far])
+            rows = rows[:, chosen]
+            seen = self._at(points, rows)
+            wrong = dot(seen.gap, seen.side) < self._slack
+            reach = (1.0 + np.where(wrong, NEAR, _BESIDE * NEAR)) * seen.wide + self._slack
+            return rows[:, seen.distance <= reach]
+
+        found = near(
+            self._middles, self._pairs, near_enough, margin=NEAR, slack=self._slack, anew=asked
+        )
+        return np.concatenate([np.zeros((3, 0), dtype=np.intp), *found], axis=1)
+
+    def _may_be_wrong(self, points: Floats, rows: np.ndarray) -> np.ndarray:
         """Which may be on the wrong side of each other, told from where their middles are."""
-        starts, ends = parts.starts, parts.ends
-        middles, steps = (0.5 * (starts + ends)).reshape(3, -1), ends - starts
-        half = 0.5 * np.sqrt(dot(*[np.moveaxis(steps, 0, -2)] * 2)).ravel()
-        first, second = place * len(self._owner) + one, place * len(self._owner) + other
-        apart = middles.take(first, axis=1) - middles.take(second, axis=1)
-        reach = half[first] + half[second] + self._slack
-        return dot(apart, self._side(frame, one, other)) <= reach
+        ends = [
+            points.take(each + self._starts(rows, which), axis=1)
+            for which in (1, 2)
+            for each in (0, 1)
+        ]
+        apart = 0.5 * (ends[0] + ends[1]) - 0.5 * (ends[2] + ends[3])
+        steps = ends[1] - ends[0], ends[3] - ends[2]
+        half, other_half = (0.5 * np.sqrt(dot(each, each)) for each in steps)
+        return dot(apart, self._side(*rows)) <= half + other_half + self._slack
 
     def _look_again(self, joints: Floats) -> None:
-        """Look anew at frames at which joints (frames, arms, joints, 3) have moved too far."""
+        """Look anew at arms that have moved too far, of joints (frames, arms, joints, 3)."""
         moved = joints - self._seen_at
-        squares = np.einsum("fajc,fajc->faj", moved, moved).max(axis=(1, 2))
-        anew = self._watched & (squares > (0.5 * self._slack) ** 2)
+        squares = np.einsum("fajc,fajc->faj", moved, moved).max(axis=2)
+        anew = self._watched[:, None] & (squares > (0.5 * self._slack) ** 2)
         if not anew.any():
             return
         self._seen_at[anew] = joints[anew]
-        kept = ~anew[self._rows[0]]
-        fresh = self._near(np.flatnonzero(anew))
-        self._rows = tuple(
-            np.concatenate([old[kept], new]) for old, new in zip(self._rows, fresh, strict=True)
-        )
+        self._middles = Middles.of(self._parts(self._seen_at))
+        frame, one, other = self._rows
+        moving = np.zeros((len(anew), self._arms + len(self._still)), dtype=bool)
+        moving[:, : self._arms] = anew
+        kept = ~(moving[frame, self._owner[one]] | moving[frame, self._owner[other]])
+        rows = np.concatenate([self._rows[:, kept], self._near(anew)], axis=1)
+        # In an order of their own: sums over them come out the same, whatever moved before.
+        count = len(self._owner)
+        self._rows = rows[
+            :, np.argsort((rows[0] * count + rows[1]) * count + rows[2], kind="stable")
+        ]
 
     def _side(self, frame: np.ndarray, one: np.ndarray, other: np.ndarray) -> Floats:
         """On which side (3, capsules) of others some belong at a frame."""
@@ -508,24 +605,27 @@ class Touching:
 
     def at(self, joints: Floats) -> Touches:
         """What is near to what, for joints (frames, arms, joints, 3)."""
-        self._look_again(joints)
-        return self._at(joints, *self._rows)
+        return all_of(self.of_each(joints, lambda touches: touches))
 
-    def _at(self, joints: Floats, frame: np.ndarray, one: np.ndarray, other: np.ndarray) -> Touches:
-        """The same of some capsules."""
-        arms = self._owner[one], self._owner[other]
-        each = self._joints - 1
-        moving = joints.shape[0] * self._arms * self._joints
-        points = np.empty((3, moving + self._body.shape[1] * 2))
-        points[:, :moving] = joints.reshape(moving, 3).T
-        points[:, moving:] = self._body.reshape(3, -1)
-        # Of each arm there is a joint more than there are segments; of the body, pairs of points.
-        first = (frame * self._arms + arms[0]) * self._joints + one - each * arms[0]
-        second = np.where(
-            arms[1] < self._arms,
-            (frame * self._arms + arms[1]) * self._joints + other - each * arms[1],
-            moving + 2 * (other - each * self._arms),
-        )
+    def of_each(self, joints: Floats, make: Callable[[Touches], _Made]) -> list[_Made]:
+        """What is made of some of that after the other, by several threads; one at least."""
+        self._look_again(joints)
+        points = self._points(joints)
+        every = pieces(self._rows.shape[1], _ROWS_AT_ONCE) or [slice(0, 0)]
+        return each_of(lambda piece: make(self._at(points, self._rows[:, piece])), every)
+
+    def _points(self, joints: Floats) -> Floats:
+        """(3, points) where capsules start and end: joints (frames, arms, joints, 3), the body."""
+        return np.concatenate([joints.reshape(-1, 3).T, self._body], axis=1)
+
+    def _starts(self, rows: np.ndarray, which: int) -> np.ndarray:
+        """Which points the one or the other start at; the ones after these are their ends."""
+        return rows[0] * self._step[rows[which]] + self._first[rows[which]]
+
+    def _at(self, points: Floats, rows: np.ndarray) -> Touches:
+        """The same of some capsules (3, n), where these points are."""
+        frame, one, other = rows
+        first, second = (self._starts(rows, which) for which in (1, 2))
         p, q = points.take(first, axis=1), points.take(second, axis=1)
         u, v = points.take(first + 1, axis=1) - p, points.take(second + 1, axis=1) - q
         s, t, gap = nearest(p, u, q, v)
@@ -533,9 +633,10 @@ class Touching:
             (1.0 - share) * self._radii[0][which] + share * self._radii[1][which]
             for share, which in ((s, one), (t, other))
         )
+        each = self._joints - 1
         return Touches(
             frame=frame,
-            arms=arms,
+            arms=(self._owner[one], self._owner[other]),
             segments=(one % each, other % each),
             shares=(s, t),
             gap=gap,
@@ -545,6 +646,18 @@ class Touching:
             side=self._side(frame, one, other),
             pair=one * len(self._owner) + other,
         )
+
+
+def all_of(found: Sequence[Touches]) -> Touches:
+    """All touches, one after the other; there is at least one piece of them."""
+
+    def joined_up(values: list[Any]) -> Any:
+        if isinstance(values[0], tuple):
+            return tuple(joined_up(list(each)) for each in zip(*values, strict=True))
+        return np.concatenate(values, axis=-1)
+
+    names = [each.name for each in fields(Touches)]
+    return Touches(**{name: joined_up([getattr(each, name) for each in found]) for name in names})
 
 
 def _places(crowd: Crowd, body: int) -> Floats:

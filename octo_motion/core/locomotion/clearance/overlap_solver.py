@@ -16,6 +16,7 @@ set-ups on bumps of 0.3 arm lengths, arms overlapping by 0.02 to 0.07 radii; "je
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Protocol
 
@@ -27,7 +28,7 @@ from ...rotations.components_first import dot
 from ...smoothing import blur_reach, blurred, covered, smooth_step, widened
 from ..ground import drawn
 from ..rig import TOLERATED, lowest_allowed
-from .capsule_overlap import Capsules, Crowd, Touches, Touching, aside
+from .capsule_overlap import Capsules, Crowd, Touches, Touching, all_of, aside
 
 _DAMPED: Final = 0.02
 """Stiffness of a segment, in squares of its length …"""
@@ -177,6 +178,24 @@ def parting(
     return (yield from crowded.run())
 
 
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """Capsules that are to part."""
+
+    touches: Touches
+    way: Floats
+    """(3, touches) which way …"""
+    far: Floats
+    """(touches,) … and how far, as of ``aside``."""
+
+    @classmethod
+    def of(cls, touches: Touches) -> _Asked:
+        """Of some that are near to each other, those that have to."""
+        way, far = aside(touches)
+        chosen = np.flatnonzero(far > 1e-6 * touches.thin)
+        return cls(part_of(touches, chosen), way[:, chosen], far[chosen])
+
+
 class _Parting:
     """One crowd, as it makes way."""
 
@@ -213,12 +232,12 @@ class _Parting:
         """Joints (frames, arms, joints, 3) after all rounds, in steps."""
         rounds = _ROUNDS + _REPEATS
         for number in range(_ROUNDS):
-            touches = self._touching.at(self._joints)
+            asked = self._asked()
             yield number / rounds
             sunk = self._room.min() < -1e-4 * self._length
-            if np.max(touches.depth, initial=0.0) <= _DONE and not sunk:
+            if np.max(asked.touches.depth, initial=0.0) <= _DONE and not sunk:
                 break
-            wanted = self._spread(self._wanted(touches))
+            wanted = self._spread(self._wanted(asked))
             yield number / rounds
             chosen = np.nonzero(_differ(wanted, 0.0))
             if len(chosen[0]):
@@ -226,7 +245,7 @@ class _Parting:
                 yield number / rounds
         given_up = np.zeros(self._held.shape)
         for number in range(_ROUNDS, rounds):
-            more = np.maximum(given_up, self._hopeless(self._touching.at(self._joints)))
+            more = np.maximum(given_up, self._hopeless(self._asked().touches))
             if np.array_equal(more, given_up):
                 break
             given_up = more
@@ -264,13 +283,19 @@ class _Parting:
 
     # --- One round ---
 
-    def _wanted(self, touches: Touches) -> Floats:
+    def _asked(self) -> _Asked:
+        """Who is asked to make way where joints are now; all that overlap are."""
+        found = self._touching.of_each(self._joints, _Asked.of)
+        return _Asked(
+            all_of([each.touches for each in found]),
+            np.concatenate([each.way for each in found], axis=1),
+            np.concatenate([each.far for each in found]),
+        )
+
+    def _wanted(self, asked: _Asked) -> Floats:
         """By how much joints (frames, arms, joints, 3) would have to move at their own frame."""
-        shape = self._joints.shape
-        way, far = aside(touches)
-        chosen = np.flatnonzero(far > 1e-6 * touches.thin)
-        way, far, touches = way[:, chosen], far[chosen], part_of(touches, chosen)
-        ways = way, -way
+        shape, touches, far = self._joints.shape, asked.touches, asked.far
+        ways = asked.way, -asked.way
         can = [self._can(touches, which, ways[which]) for which in (0, 1)]
         whole = can[0] + can[1] + _LITTLE
         places, weights, pushes = [], [], []
