@@ -238,60 +238,73 @@ def near(
     size = middles.reach + (1.0 + margin) * middles.wide + 0.5 * slack
     limit = np.full((len(owner), len(owner)), -np.inf, dtype=np.float32)
     limit[pairs] = ((size[pairs[0]] + size[pairs[1]]) * (1.0 + _ROUNDED)) ** 2 + rounding
-    limit = np.maximum(limit, limit.T)
     asked = np.ones((len(middles.places), owner.max() + 1), dtype=bool) if anew is None else anew
-    rows = max(1, _FOR_ONE_THREAD // (5 * len(owner)))
-    tasks: list[tuple[np.ndarray, slice]] = []
-    for chain in np.flatnonzero(asked.any(axis=0)):
-        first, last = np.searchsorted(owner, [chain, chain + 1]).tolist()
-        frames = np.flatnonzero(asked[:, chain])
-        for row in range(first, last, rows):
-            own = slice(row, min(row + rows, last))
-            step = max(1, _AT_ONCE // ((own.stop - row) * len(owner)))
-            tasks += [(frames[each], own) for each in pieces(len(frames), step)]
-
-    def look(task: tuple[np.ndarray, slice]) -> _Made:
-        return make(_near_to(middles, limit, asked, *task, rounding))
-
-    return each_of(look, tasks)
+    search = _Search(middles, np.maximum(limit, limit.T), rounding, asked)
+    return each_of(lambda task: make(search.near_to(*task)), search.tasks())
 
 
-def _near_to(
-    middles: Middles,
-    limit: np.ndarray,
-    asked: np.ndarray,
-    frames: np.ndarray,
-    own: slice,
-    rounding: float,
-) -> Near:
-    """What is near to some capsules of one chain, at some frames; of two chains that are both asked
-    for, the earlier one finds the other's capsules.
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """A search for what is near to what."""
+
+    middles: Middles
+    limit: np.ndarray
+    """(capsules, capsules) squares of how far apart each two may be, none below nothing."""
+    rounding: float
+    """By which squares of distances may be wrong."""
+    asked: np.ndarray
+    """(frames, chains) whose capsules are asked for."""
+
+    def tasks(self) -> list[tuple[np.ndarray, slice]]:
+        """Frames (n,) and capsules of one chain, as many as are looked at in one go."""
+        owner, count = self.middles.owner, len(self.limit)
+        rows = max(1, _FOR_ONE_THREAD // (5 * count))
+        found: list[tuple[np.ndarray, slice]] = []
+        for chain in np.flatnonzero(self.asked.any(axis=0)):
+            first, last = np.searchsorted(owner, [chain, chain + 1]).tolist()
+            frames = np.flatnonzero(self.asked[:, chain])
+            for row in range(first, last, rows):
+                own = slice(row, min(row + rows, last))
+                step = max(1, _AT_ONCE // ((own.stop - row) * count))
+                found += [(frames[each], own) for each in pieces(len(frames), step)]
+        return found
+
+    def near_to(self, frames: np.ndarray, own: slice) -> Near:
+        """What is near to some capsules of one chain, at some frames (n,); of two chains that are
+        both asked for, the earlier one finds the other's capsules.
+        """
+        middles, owner = self.middles, self.middles.owner
+        chain, begin = owner[own.start], 0
+        if self.asked[frames, :chain].all():
+            begin = int(np.searchsorted(owner, chain + 1))
+        products = _squares(middles, frames, own, begin)
+        limits = self.limit[own, begin:]
+        # Several times faster than where a row, a column and a frame are found at once.
+        spots = np.flatnonzero(products <= limits)
+        place, spot = np.divmod(spots, max(limits.size, 1))
+        row, column = np.divmod(spot, max(limits.shape[1], 1))
+        row, column, frame = row + own.start, column + begin, frames[place]
+        squares = products.ravel()[spots]
+        if not begin:
+            once = (owner[column] > chain) | ~self.asked[frame, owner[column]]
+            row, column, frame, squares = (each[once] for each in (row, column, frame, squares))
+        distance = np.sqrt(np.maximum(squares - self.rounding, 0.0))
+        least = (1.0 - _ROUNDED) * distance - (middles.reach[row] + middles.reach[column])
+        return Near(frame, np.minimum(row, column), np.maximum(row, column), least)
+
+
+def _squares(middles: Middles, frames: np.ndarray, own: slice, begin: int) -> np.ndarray:
+    """Squares of the distances (n, rows, columns) of some capsules to all from one on, at frames
+    (n,).
     """
-    owner, chain = middles.owner, middles.owner[own.start]
-    begin = 0
-    if asked[frames, :chain].all():
-        begin = int(np.searchsorted(owner, chain + 1))
-    # |a − b|² = |a|² + |b|² − 2 a · b, all of it in one product.
     here, there = middles.places[frames, own], middles.places[frames, begin:]
+    # |a − b|² = |a|² + |b|² − 2 a · b, all of it in one product.
     first = np.empty((*here.shape[:2], 5), dtype=np.float32)
     first[..., :3], first[..., 3], first[..., 4] = -2.0 * here, middles.squares[frames, own], 1.0
     second = np.empty((len(frames), 5, there.shape[1]), dtype=np.float32)
     second[:, :3] = np.moveaxis(there, 1, 2)
     second[:, 3], second[:, 4] = 1.0, middles.squares[frames, begin:]
-    products = np.matmul(first, second)
-    limits = limit[own, begin:]
-    # Several times faster than where a row, a column and a frame are found at once.
-    spots = np.flatnonzero(products <= limits)
-    place, spot = np.divmod(spots, max(limits.size, 1))
-    row, column = np.divmod(spot, max(limits.shape[1], 1))
-    row, column, frame = row + own.start, column + begin, frames[place]
-    squares = products.ravel()[spots]
-    if not begin:
-        once = (owner[column] > chain) | ~asked[frame, owner[column]]
-        row, column, frame, squares = (each[once] for each in (row, column, frame, squares))
-    distance = np.sqrt(np.maximum(squares - rounding, 0.0))
-    least = (1.0 - _ROUNDED) * distance - (middles.reach[row] + middles.reach[column])
-    return Near(frame, np.minimum(row, column), np.maximum(row, column), least)
+    return np.matmul(first, second)
 
 
 def joined(

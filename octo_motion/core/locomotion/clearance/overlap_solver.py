@@ -15,7 +15,7 @@ set-ups on bumps of 0.3 arm lengths, arms overlapping by 0.02 to 0.07 radii; "je
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Protocol
@@ -26,6 +26,7 @@ from ...content_cache import part_of
 from ...rotations import Floats
 from ...rotations.components_first import dot
 from ...smoothing import blur_reach, blurred, covered, smooth_step, widened
+from ...threads import each_of, pieces
 from ..ground import drawn
 from ..rig import TOLERATED, lowest_allowed
 from .capsule_overlap import Capsules, Crowd, Touches, Touching, all_of, aside
@@ -122,6 +123,10 @@ as much. A fifth faster than before, arms that hold on for long turn by 20° in 
 instead of 13°."""
 _REPEATS: Final = 3
 """How often arms that could not make way well are looked for."""
+_ARMS_AT_ONCE: Final = 512
+"""Arms at some frame that are turned in one go …"""
+_COLUMNS_AT_ONCE: Final = 32
+"""… and joints whose ways are evened out over all frames in one go."""
 _LITTLE: Final = 0.02
 """Share of a mean radius by which it begins gently to matter what is asked."""
 
@@ -239,10 +244,8 @@ class _Parting:
                 break
             wanted = self._spread(self._wanted(asked))
             yield number / rounds
-            chosen = np.nonzero(_differ(wanted, 0.0))
-            if len(chosen[0]):
-                self._move(chosen, wanted[chosen])
-                yield number / rounds
+            self._move(wanted)
+            yield number / rounds
         given_up = np.zeros(self._held.shape)
         for number in range(_ROUNDS, rounds):
             more = np.maximum(given_up, self._hopeless(self._asked().touches))
@@ -348,11 +351,21 @@ class _Parting:
         size = _length(flat[:, asked])
         some = size.max(axis=0, initial=0.0) > 1e-6 * self._scale
         columns, size = asked[some], size[:, some]
-        if not len(columns):
-            return result
+        each_of(
+            lambda part: self._spread_some(columns[part], flat, size[:, part], spread),
+            pieces(len(columns), _COLUMNS_AT_ONCE),
+        )
+        return result
+
+    def _spread_some(
+        self, columns: np.ndarray, wanted: Floats, size: Floats, spread: Floats
+    ) -> None:
+        """The same of some joints of arms (columns,), told by wanted (frames, arms · joints, 3) and
+        its size (frames, columns).
+        """
         # The way is told over as many frames as it is gone in: where one would be at an end before
         # the other, arms would set out with a jump.
-        mean = blurred(flat[:, columns], 2 * self._width, cyclic=self._cyclic)
+        mean = blurred(wanted[:, columns], 2 * self._width, cyclic=self._cyclic)
         length = _length(mean)
         # Where it is asked to go now one way and now the other, it stays between them.
         mean_size = blurred(size, 2 * self._width, cyclic=self._cyclic)
@@ -361,9 +374,12 @@ class _Parting:
         whole[whole < 1e-5 * self._scale] = 0.0
         whole *= self._loose.reshape(len(wanted), -1)[:, columns]
         spread[:, columns] = (whole / np.maximum(length, _TINY))[..., None] * mean
-        return result
 
-    def _move(self, chosen: tuple[np.ndarray, ...], wanted: Floats) -> None:
+    def _move(self, wanted: Floats) -> None:
+        """Let joints move by what is wanted (frames, arms, joints, 3)."""
+        _in_pieces(lambda own: self._turn(own, wanted[own]), np.nonzero(_differ(wanted, 0.0)))
+
+    def _turn(self, chosen: tuple[np.ndarray, ...], wanted: Floats) -> None:
         """Turn the segments of arms at some frames (items,).
 
         Their joints are to move by what is wanted (items, joints, 3).
@@ -457,12 +473,25 @@ class _Parting:
 
     def _give_up(self, share: Floats) -> None:
         """Let arms (frames, arms) move as they did before, by some share."""
-        chosen = np.nonzero((share > 1e-9) & self._changed())
-        back = share[chosen][:, None, None]
-        before, after = self._before[chosen], self._directions[chosen]
-        mixed = _unit(after + back * (before - after))
-        mixed = np.where(back >= 1.0 - 1e-9, before, self._drawn_back(chosen, mixed))
-        self._put(chosen, mixed)
+
+        def give_up(chosen: tuple[np.ndarray, ...]) -> None:
+            back = share[chosen][:, None, None]
+            before, after = self._before[chosen], self._directions[chosen]
+            mixed = _unit(after + back * (before - after))
+            mixed = np.where(back >= 1.0 - 1e-9, before, self._drawn_back(chosen, mixed))
+            self._put(chosen, mixed)
+
+        _in_pieces(give_up, np.nonzero((share > 1e-9) & self._changed()))
+
+
+def _in_pieces(
+    work: Callable[[tuple[np.ndarray, ...]], None], chosen: tuple[np.ndarray, ...]
+) -> None:
+    """Work on some arms (items,) and (items,) at their frames, so many at a time that all that is
+    made of them stays in the cache.
+    """
+    parts = pieces(len(chosen[0]), _ARMS_AT_ONCE)
+    each_of(work, [tuple(each[part] for each in chosen) for part in parts])
 
 
 def _within(before: Floats, after: Floats, free: Floats) -> Floats:
