@@ -70,21 +70,23 @@ def each_of(work: Callable[[_Item], _Outcome], items: Sequence[_Item]) -> list[_
 
 def abreast(
     works: Sequence[Generator[Any, None, _Outcome]],
-) -> Generator[None, None, list[_Outcome]]:
-    """What comes of works in steps, in their order; a yield each time that all threads have met.
+) -> Generator[list[Any], None, list[_Outcome]]:
+    """What comes of works in steps, in their order; each time that all threads have met, what each
+    work has yielded last, none if it has not begun.
 
     Raises:
         Exception: what the first work that fails has raised.
     """
     found: dict[int, _Outcome] = {}
+    said: list[Any] = [None] * len(works)
     threads = thread_count()
 
     def turn(number: int) -> None:
         until = time.perf_counter() + (_TURN if threads > 1 else 0.0)
         try:
-            next(works[number])
+            said[number] = next(works[number])
             while time.perf_counter() < until:
-                next(works[number])
+                said[number] = next(works[number])
         except StopIteration as last:
             found[number] = last.value
 
@@ -93,7 +95,7 @@ def abreast(
         if not open_ones:
             return [found[number] for number in range(len(works))]
         each_of(turn, open_ones[:threads])
-        yield
+        yield list(said)
 
 
 def pieces(length: int, most: int) -> list[slice]:
