@@ -16,7 +16,7 @@ import os
 import time
 from collections.abc import Callable, Generator, Sequence
 from contextvars import copy_context
-from itertools import count
+from itertools import count, pairwise
 from threading import Thread
 from typing import Any, Final, TypeVar
 
@@ -99,5 +99,15 @@ def abreast(
 
 
 def pieces(length: int, most: int) -> list[slice]:
-    """Slices of a row of that length that follow one another, of so many items at most each."""
-    return [slice(start, min(start + most, length)) for start in range(0, length, most)]
+    """Slices of a row of that length that follow one another, of so many items at most each, and of
+    as many items each as the others.
+    """
+    count = -(-length // most)
+    ends = [length * number // count for number in range(count + 1)] if count else []
+    return [slice(start, end) for start, end in pairwise(ends)]
+
+
+def shares(length: int, most: int) -> list[slice]:
+    """The same, of which each thread gets as many as the others; all in one if it is that short."""
+    rounds = -(-length // (most * thread_count()))
+    return pieces(length, most if length <= most else -(-length // (rounds * thread_count())))

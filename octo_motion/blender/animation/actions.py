@@ -734,7 +734,9 @@ def _fill_dense(curve: bpy.types.FCurve, points: np.ndarray, kinds: np.ndarray) 
         keys.add(len(points))
     keys.foreach_set("co", points.ravel())
     if not alike:
-        keys.foreach_set("interpolation", kinds[0])
+        # New ones are curved already.
+        if _kind_of(keys)[0] != ("BEZIER" if automatic else "LINEAR"):
+            keys.foreach_set("interpolation", kinds[0])
         keys.foreach_set("type", kinds[1])
         if automatic:
             keys.foreach_set("handle_left_type", kinds[2])

@@ -105,7 +105,7 @@ _EXACT_ANGLE: Final = np.radians(0.5)
 """Radians that keys on every frame may be off there …"""
 _EXACT_DISTANCE: Final = 0.002
 """… and arm lengths of an arm's tip."""
-_BONES_AT_ONCE: Final = 48_000
+_BONES_AT_ONCE: Final = 50_000
 """Bones times frames of one step of the work: some tens of megabytes."""
 _KEPT: Final = 2**25 - 2**16
 """Bytes of the largest arrays whose memory is kept: glibc keeps that of none beyond 2**25."""

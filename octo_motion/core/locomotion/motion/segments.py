@@ -20,7 +20,7 @@ from ...phrases import phrase
 from ...rotations import Floats, rotate
 from ...smoothing import least_jerk
 from ...steps import saying
-from ...threads import abreast, pieces, thread_count
+from ...threads import abreast, shares, thread_count
 from ..clearance import afloat
 from ..gait import CYCLE, GaitPoser, GaitTable
 from ..ground import (
@@ -587,7 +587,7 @@ class Segments:
             )
             made = SegmentMotion(ArmMotion.at_rest(len(travel.distance), self.bones))
             motion.segments.append(made)
-            threads, chosen = thread_count(), pieces(len(part), step)
+            threads, chosen = thread_count(), shares(len(part), step)
             for start in range(0, len(chosen), threads):
                 done = 0.9 * (segment + start / len(chosen)) / self.count
                 own = chosen[start : start + threads]
