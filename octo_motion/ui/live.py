@@ -5,8 +5,8 @@ Blender tells after each update what has changed. If that is something that a mo
 a timer shows the frame in sight as it is going to be, outside the update; what changes in the
 meantime waits for the same turn. Once nothing has changed for a while, all of it is made anew, in
 short turns between which Blender goes on. What our own writing changes is let through Blender's
-update before we listen again. Where nothing is live, Blender is not kept waiting: thousands of
-objects may move with each frame.
+update before we listen again. Where nothing is live, nobody is told of updates: thousands of objects
+may move with each frame.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ def tell_switched(settings: Any, _context: bpy.types.Context) -> None:
     """
     for each in _all:
         each.switched.add(settings.id_data.name)
+        each.begin_watching()
     settings.id_data.update_tag(refresh={"OBJECT"})
 
 
@@ -291,12 +292,15 @@ class Live(_Following):
 
     def __init__(self) -> None:
         super().__init__()
+        self.end_watching: Callable[[], None] = self._end_watching
         _all.append(self)
 
     def listen(self) -> None:
         """Listen to Blender."""
-        for handlers, function in self._handlers():
+        for handlers, function in self._rare():
             handlers.append(function)
+        # While an add-on is switched on, Blender's data is out of reach.
+        self._watch_for_now()
 
     def listen_no_more(self) -> None:
         """Listen no more, and drop what was about to be made."""
@@ -304,15 +308,42 @@ class Live(_Following):
             self.let_go(armature_named(name), name)
         self.drop()
         self.clear()
-        for handlers, function in self._handlers():
+        stop_timer(self.end_watching)
+        for handlers, function in (*self._frequent(), *self._rare()):
             if function in handlers:
                 handlers.remove(function)
 
-    def _handlers(self) -> list[tuple[Any, Any]]:
+    def begin_watching(self) -> None:
+        """Be told of each update from now on."""
+        for handlers, function in self._frequent():
+            if function not in handlers:
+                handlers.append(function)
+
+    def _end_watching(self) -> None:
+        """Be told of none any more, if nothing is live."""
+        if not self.listens() and self.complete:
+            for handlers, function in self._frequent():
+                if function in handlers:
+                    handlers.remove(function)
+
+    def _watch_for_now(self) -> None:
+        """Be told of updates, and soon of none if nothing is live. Where Blender goes through those
+        that it tells, whoever comes after one that is taken out would be left out.
+        """
+        self.begin_watching()
+        if not bpy.app.timers.is_registered(self.end_watching):
+            bpy.app.timers.register(self.end_watching, first_interval=SOON)
+
+    def _frequent(self) -> list[tuple[Any, Any]]:
         known = bpy.app.handlers
         return [
             (known.depsgraph_update_post, self.after_update),
             (known.frame_change_post, self.after_frame),
+        ]
+
+    def _rare(self) -> list[tuple[Any, Any]]:
+        known = bpy.app.handlers
+        return [
             (known.undo_pre, self._before_undo),
             (known.redo_pre, self._before_undo),
             (known.undo_post, self._after_undo),
@@ -326,7 +357,7 @@ class Live(_Following):
     @persistent
     def after_update(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         """After each update."""
-        if self.busy or depsgraph.mode != "VIEWPORT" or not self.listens():
+        if self.busy or depsgraph.mode != "VIEWPORT" or not self._is_to_look():
             return
         touched = touched_by(depsgraph)
         for each in touched:
@@ -345,7 +376,7 @@ class Live(_Following):
     @persistent
     def after_frame(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         """A change that comes with another frame, as while it plays, is told here alone."""
-        if self.busy or depsgraph.mode != "VIEWPORT" or not self.listens():
+        if self.busy or depsgraph.mode != "VIEWPORT" or not self._is_to_look():
             return
         self._show_again(scene)
         followed = [each for name in self.seen if (each := armature_named(name)) is not None]
@@ -358,6 +389,13 @@ class Live(_Following):
                 self.soon(armature.name, certain=False, wait=LATER)
             if not still.isdisjoint(its):
                 self.soon(armature.name, certain=True)
+
+    def _is_to_look(self) -> bool:
+        """Whether anything is live that an update may change."""
+        if self.listens():
+            return True
+        self._watch_for_now()
+        return False
 
     def _show_again(self, scene: bpy.types.Scene) -> None:
         """Show motions that are on their way as they are going to be at another frame, too."""
@@ -382,12 +420,23 @@ class Live(_Following):
                 if each.name not in self.seen:
                     self.seen[each.name] = self.made_from(each)
             self.rates = {each.name: _rate(each) for each in bpy.data.scenes}
-            self.complete = True
+            # A linked one may be overridden or made local at any time.
+            self.complete = not self._is_any_linked()
         while self.switched:
             armature = armature_named(self.switched.pop())
             if armature is not None:
                 self.look_at(armature)
         return bool(self.seen)
+
+    def _is_any_linked(self) -> bool:
+        """Whether an armature is live that is linked from another file."""
+        return len(bpy.data.libraries) > 0 and any(
+            each.type == "ARMATURE"
+            and each.library is not None
+            and each.is_property_set("octo_motion")
+            and self.settings(each).live
+            for each in bpy.data.objects
+        )
 
     def look_at(self, armature: bpy.types.Object) -> None:
         """Begin or cease to follow an armature, or see whether its settings have changed."""
@@ -416,7 +465,8 @@ class Live(_Following):
         for armature in self.live_armatures():
             self.seen[armature.name] = None
             self.soon(armature.name, certain=True)
-        self.complete = True
+        self.begin_watching()
+        self._end_watching()
 
     @persistent
     def _before_saving(self, *_: object) -> None:
@@ -432,11 +482,13 @@ class Live(_Following):
 
     @persistent
     def _after_loading(self, *_: object) -> None:
-        self.listens()
+        self.begin_watching()
+        self._end_watching()
 
     @persistent
     def _after_import(self, *_: object) -> None:
         self.complete = False
+        self._watch_for_now()
 
 
 # --- What there is to know of Blender -------------------------------------------------------------

@@ -836,6 +836,54 @@ def test_where_nothing_is_live_nobody_looks_at_what_moves(octopus: Any) -> None:
         live._state.after_frame(bpy.context.scene, told)
 
 
+def told_of_updates() -> list[Any]:
+    """Those of ours whom Blender calls after each update and each frame."""
+    known = bpy.app.handlers
+    ours = {live._state.after_update, live._state.after_frame}
+    return [
+        each for each in (*known.depsgraph_update_post, *known.frame_change_post) if each in ours
+    ]
+
+
+def test_where_nothing_is_live_blender_calls_nobody(octopus: Any, tmp_path: Path) -> None:
+    saved = {}
+    for on in (True, False):
+        settings_of(octopus).live = on
+        settle()
+        saved[on] = str(tmp_path / f"{on}.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=saved[on])
+    # Not while Blender goes through those that it calls, but right after.
+    bpy.context.view_layer.update()
+    assert bpy.app.timers.is_registered(live._state.end_watching)
+    live._state.end_watching()
+    assert not told_of_updates()
+    settings_of(octopus).live = True
+    assert len(told_of_updates()) == 2
+    for on in (False, True, False):
+        bpy.ops.wm.open_mainfile(filepath=saved[on])
+        assert len(told_of_updates()) == 2 * on
+
+
+def test_what_is_appended_or_linked_live_is_followed(octopus: Any, tmp_path: Path) -> None:
+    name, path = octopus.name, str(tmp_path / "live.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    for link in (False, True):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        assert not told_of_updates()
+        with bpy.data.libraries.load(path, link=link) as (_, loaded):
+            loaded.objects = [name]
+        found: Any = loaded.objects[0]
+        bpy.context.scene.collection.objects.link(found)
+        live._state.end_watching()
+        bpy.context.view_layer.update()
+        if link:
+            assert not live._state.seen
+            found = found.override_create(remap_local_usages=True)
+            bpy.context.view_layer.update()
+        assert len(told_of_updates()) == 2
+        assert found.name in live._state.seen
+
+
 def test_while_a_tool_has_the_screen_the_motion_waits(
     octopus: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
