@@ -162,10 +162,11 @@ def _elements(problem: Problem, parents: Sequence[int]) -> list[_Block]:
             load = -stiffness * spring - backward * w
             size = float(np.sqrt(load @ load))
             flows = limit == 0.0 or size > limit
-            kept = law.kept[body] if flows else 1.0
+            share = backward * law.compliance[body]
+            kept = 1.0 - share if flows else 1.0
             held = np.zeros(3)
             if flows and limit > 0.0:
-                held = law.share[body] * limit * load / size
+                held = share * limit * load / size
             for axis in range(3):
                 # λ = held + kept (−K q − G w) and w = w₀ + A P with P = h λ.
                 without = w[axis] + own[axis] @ (result - impulse) - own[axis, axis] * result[axis]

@@ -35,9 +35,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...rotations import Floats
-from .figure import Elements, Flags, Integers
+from .figure import Elements, Flags
 
-_TINY = 1e-300
+_TINY = 1e-60
 _ONES = np.ones(3)
 _UNIT = np.eye(3)
 
@@ -45,72 +45,69 @@ _UNIT = np.eye(3)
 # Not frozen, as a frozen one takes eight times as long to make, in every step.
 @dataclass(eq=False)
 class ElementResponse:
-    """How the elements answer a relative angular velocity w over one step."""
+    """How the elements answer a relative angular velocity w over one step.
+
+    All joints are worked out alike, whether they flow or hold: to pick out some of a few hundred
+    takes longer.
+    """
 
     law: PlasticLaw
     load: Floats
     """(joints, 3) λ, the torque on the child, N·m."""
     trial: Floats
     """(joints, 3) λ_e, what it would be without flow."""
-    flows: Flags | None
+    flows: Flags | None = None
     """(joints,) where the series damper moves; None where all hold: the load is linear in w."""
-    which: Integers
-    """(which,) those joints."""
-    toward: Floats
-    """(which, 3) of these, λ_e/|λ_e|; …"""
-    size: Floats
-    """(which,) … and |λ_e|."""
+    size: Floats | None = None
+    """(joints,) |λ_e|; None where it is not needed."""
+    pace: Floats | None = None
+    """(joints,) |w_d|/|λ_e|, …"""
+    share: Floats | None = None
+    """(joints,) … and |λ|/|λ_e|; None where they are not needed."""
     flow: Floats | None = None
-    """(which, 3) w_d; None where it follows from the load, see ``flows_with``."""
+    """(joints, 3) w_d; None where it follows from the pace, see ``flows_with``."""
     bent: Floats | None = None
-    """(which, 3, 3) the slopes; None likewise."""
+    """(joints, 3, 3) the slopes of impulses over a step; None likewise, see ``slopes``."""
 
     @property
     def slope(self) -> Floats:
         """(joints, 3, 3) −∂λ/∂w, symmetric and positive semidefinite, N·m·s/rad."""
-        slope = self.law.diagonal
-        if self.flows is not None:
-            slope = slope.copy()
-            slope[self.which] = self.bends()
-        return slope
+        return self.slopes() / self.law.step
 
-    def bends(self) -> Floats:
-        """(which, 3, 3) the slopes of what flows."""
+    def slopes(self) -> Floats:
+        """(joints, 3, 3) the same for the impulse over a step."""
+        if self.flows is None:
+            return self.law.held
         if self.bent is not None:
             return self.bent
-        # Along s only what the flow leaves, across it also the turning of s.
-        law, which, toward = self.law, self.which, self.toward
-        gain = law.backward.take(which)
-        ratio = gain * law.shared_yield.take(which) / self.size
-        across = gain * law.kept.take(which) + ratio
-        blocks = across[:, None, None] * _UNIT
-        blocks -= (ratio[:, None] * toward)[:, :, None] * toward[:, None, :]
+        assert self.size is not None
+        assert self.share is not None
+        # Along λ_e only what the flow leaves, across it also the turning of λ_e.
+        law, size, trial = self.law, self.size, self.trial
+        ratio = law.bending / (size * size * size)
+        ratio *= self.flows
+        blocks = (law.gain * self.share)[:, None, None] * _UNIT
+        blocks -= (ratio[:, None] * trial)[:, :, None] * trial[:, None, :]
         return blocks
 
     def flows_with(self) -> Floats:
-        """(which, 3) w_d, rad/s, of what flows."""
+        """(joints, 3) w_d, rad/s; zero of what holds. Only where something flows."""
         if self.flow is not None:
             return self.flow
-        law, which = self.law, self.which
-        excess = (law.yield_torque.take(which) - self.size) * law.compliance.take(which)
-        return self.toward * excess[:, None]
+        assert self.pace is not None
+        return self.trial * -self.pace[:, None]
 
     def planes(self, at_rest: Floats, speeds: Floats | None) -> tuple[Floats, Floats]:
         """The impulse over a step as a plane that touches it at w (joints, 3): p = right − slope w,
         (joints, 3, 3) and (joints, 3).
 
         ``at_rest`` is the load at rest; without w it is where elements have the load ``trial``.
-        What holds is its own plane, whatever w is.
         """
-        law, which = self.law, self.which
-        slopes, right = law.held.copy(), law.step * at_rest
-        bent = law.step * self.bends()
-        if speeds is None:
-            at = law.speed_at(which, at_rest.take(which, 0) - self.trial.take(which, 0))
-        else:
-            at = speeds.take(which, 0)
-        slopes[which] = bent
-        right[which] = law.step * self.load.take(which, 0) + (bent @ at[:, :, None])[:, :, 0]
+        law = self.law
+        slopes = self.slopes()
+        at = law.speed_at(at_rest - self.trial) if speeds is None else speeds
+        right = (slopes @ at[:, :, None])[:, :, 0]
+        right += law.step * self.load
         return slopes, right
 
 
@@ -128,17 +125,19 @@ class PlasticLaw:
             """1/(D_d + G), zero where the series damper is rigid."""
             self.mobility = np.where(self.backward > 0.0, 1.0 / self.backward, 0.0)
             """1/G, zero where there is no element."""
-        self.share = self.backward * self.compliance
-        """G/(D_d + G), of a load above yield: what the flow takes away."""
-        self.kept = 1.0 - self.share
         self.yield_torque = np.array(elements.yield_torque, dtype=np.float64)
         yields = np.isfinite(self.yield_torque)
-        self.shared_yield = self.share * np.where(yields, self.yield_torque, 0.0)
-        """G τ/(D_d + G)."""
-        self.can_flow = bool(np.any((self.compliance > 0.0) & yields))
+        self._paces = np.where(yields, self.compliance, 0.0)
+        self._least = self._paces * np.where(yields, self.yield_torque, 0.0)
+        # w_d = −λ_e (1 − τ/|λ_e|)/(D_d + G): nothing below yield.
+        self.can_flow = bool(np.any(self._paces > 0.0))
+        self.gain = step * self.backward
+        """(joints,) h G."""
+        self.bending = self.gain * self.backward * self._least
+        """(joints,) h G² τ/(D_d + G)."""
         self._stiffness3 = np.tile(-self.stiffness[:, None], 3)
         self._backward3 = np.tile(self.backward[:, None], 3)
-        self._square_yield = self.yield_torque * self.yield_torque
+        self._mobility3 = np.tile(self.mobility[:, None], 3)
         self.diagonal = self.backward[:, None, None] * _UNIT
         """(joints, 3, 3) slope of an element that holds."""
         self.held = step * self.diagonal
@@ -148,9 +147,9 @@ class PlasticLaw:
         """The law of a step in world axes, of bones with axes (joints, 3, 3)."""
         return self
 
-    def speed_at(self, which: Integers, change: Floats) -> Floats:
-        """(which, 3) w that takes so much from the loads (which, 3) of elements without flow."""
-        return change * self.mobility.take(which)[:, None]
+    def speed_at(self, change: Floats) -> Floats:
+        """(joints, 3) w that takes so much from the loads (joints, 3) of elements without flow."""
+        return change * self._mobility3
 
     def at_rest(self, spring: Floats) -> Floats:
         """−K_f q_f (joints, 3), the load at rest without flow."""
@@ -167,24 +166,17 @@ class PlasticLaw:
     def answer(self, trial: Floats) -> ElementResponse:
         """The same from λ_e (joints, 3)."""
         if not self.can_flow:
-            return _held(self, trial)
-        square = (trial * trial) @ _ONES
+            return ElementResponse(self, trial, trial)
+        size = np.sqrt((trial * trial) @ _ONES)
+        size += _TINY
         # With a threshold of 0 it flows even at rest: there its law is linear.
-        flows = square >= self._square_yield
-        which = flows.nonzero()[0]
-        if not len(which):
-            return _held(self, trial)
-        size = np.sqrt(square.take(which)) + _TINY
-        toward = trial.take(which, 0) / size[:, None]
-        load = trial.copy()
-        borne = self.shared_yield.take(which) + self.kept.take(which) * size
-        load[which] = toward * borne[:, None]
-        return ElementResponse(self, load, trial, flows, which, toward, size)
-
-
-def _held(law: PlasticLaw, trial: Floats) -> ElementResponse:
-    """Where nothing flows."""
-    return ElementResponse(law, trial, trial, None, _NOBODY, _NO_ROWS, _NO_ONES)
+        pace = self._paces - self._least / size
+        flows = pace > 0.0
+        if not np.count_nonzero(flows):
+            return ElementResponse(self, trial, trial)
+        pace *= flows
+        share = 1.0 - self.backward * pace
+        return ElementResponse(self, trial * share[:, None], trial, flows, size, pace, share)
 
 
 class AxisLaw(PlasticLaw):
@@ -212,12 +204,9 @@ class AxisLaw(PlasticLaw):
         own = (self._back_turned @ vectors[:, :, None])[:, :, 0] * factors
         return (self._frames @ own[:, :, None])[:, :, 0]
 
-    def speed_at(self, which: Integers, change: Floats) -> Floats:
-        back = self._back.take(which, 0)
-        mobility = np.divide(1.0, back, out=np.zeros_like(back), where=back > 0.0)
-        frames = self._frames.take(which, 0)
-        own = (change[:, None, :] @ frames)[:, 0] * mobility
-        return (frames @ own[:, :, None])[:, :, 0]
+    def speed_at(self, change: Floats) -> Floats:
+        mobility = np.divide(1.0, self._back, out=np.zeros_like(self._back), where=self._back > 0.0)
+        return self._along(mobility, change)
 
     def at_rest(self, spring: Floats) -> Floats:
         return self._along(-self._stiff, spring)
@@ -233,7 +222,7 @@ class AxisLaw(PlasticLaw):
         flows = (size >= self.yield_torque) & (size > 0.0) & self._can_flow
         which = flows.nonzero()[0]
         if not len(which):
-            return _held(self, trial)
+            return ElementResponse(self, trial, trial)
         frames = self._frames.take(which, 0)
         back, limit = self._back.take(which, 0), self.yield_torque.take(which)[:, None]
         own = (trial.take(which, 0)[:, None, :] @ frames)[:, 0]
@@ -244,13 +233,15 @@ class AxisLaw(PlasticLaw):
         firm = speed[:, :, None] * whole[:, :, None] * _UNIT
         firm += limit[:, :, None] * (_UNIT - way[:, :, None] * way[:, None, :])
         inner = back[:, :, None] * (speed[:, :, None] * np.linalg.inv(firm)) * back[:, None, :]
-        slopes = frames @ (back[:, :, None] * _UNIT - inner) @ frames.transpose(0, 2, 1)
-        flow = -(frames @ (speed * way)[:, :, None])[:, :, 0]
+        bent = self.held.copy()
+        bent[which] = (
+            self.step * frames @ (back[:, :, None] * _UNIT - inner) @ frames.transpose(0, 2, 1)
+        )
+        flow = np.zeros_like(trial)
+        flow[which] = -(frames @ (speed * way)[:, :, None])[:, :, 0]
         load = trial.copy()
         load[which] -= (frames @ (back * speed * way)[:, :, None])[:, :, 0]
-        size = size.take(which)
-        toward = trial.take(which, 0) / size[:, None]
-        return ElementResponse(self, load, trial, flows, which, toward, size, flow, slopes)
+        return ElementResponse(self, load, trial, flows, flow=flow, bent=bent)
 
 
 def _overstressed(trial: Floats, whole: Floats, limit: Floats) -> Floats:
@@ -288,6 +279,3 @@ def _three(coefficients: Floats) -> Floats:
 _MOST_ROUNDS = 60
 _LEAST_SPEED = 1e-12
 """rad/s"""
-_NOBODY = np.zeros(0, np.int64)
-_NO_ROWS = np.zeros((0, 3))
-_NO_ONES = np.zeros(0)

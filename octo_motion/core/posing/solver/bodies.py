@@ -13,7 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...rotations import Floats, normalized, small_batches
-from ..puppet import Figure, Flags, Integers, Pose, pose_of
+from ..puppet import Figure, Flags, Pose, pose_of
 from .tree import Tree
 
 
@@ -146,12 +146,12 @@ class Bodies:
         turns: Floats,
         shifts: Floats,
         springs: Floats | None = None,
-        which: Integers | None = None,
+        flows: Flags | None = None,
     ) -> None:
         """Turn by rotation vectors (bodies, 3) and shift the roots by (roots, 3), world axes.
 
-        Where ``springs`` (which, 3) are given, in the parents' frames, the rest of these moves so
-        that they are bent by them.
+        Where ``springs`` (bodies, 3) are given, in the parents' frames, the rest of those that flow
+        (bodies,) moves so that they are bent by them.
         """
         count = len(turns)
         vectors = turns if springs is None else np.concatenate([turns, -springs])
@@ -162,11 +162,9 @@ class Bodies:
         self.orientations = orientations
         self.roots = self.roots + shifts
         self.refresh()
-        if which is not None and len(which):
-            now = small_batches.conjugate_multiply(
-                self.parent_turns.take(which, 0), orientations.take(which, 0)
-            )
-            self.rest[which] = small_batches.multiply(turned[count:], now)
+        if flows is not None:
+            rest = small_batches.multiply(turned[count:], self.turns())
+            np.copyto(self.rest, rest, where=flows[:, None])
 
 
 _CHANGING = ("roots", "orientations", "rest", "linear", "angular", "spin")

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...rotations import Floats, small_batches
-from ..puppet import Figure, Integers, Pose
+from ..puppet import Figure, Pose
 from .contact_detection import CarriedCapsules, Contacts, Detector, joined_contacts
 from .newton import InitialGuess, Solution
 from .obstacle_shapes import Obstacle
@@ -137,9 +137,8 @@ class CarriedWorld(World):
             self._bodies.rest = small_batches.multiply(self._leading.turns, self._bodies.rest)
         super()._move(problem, solution)
 
-    def _springs_after(self, problem: Problem, solution: Solution, flowing: Integers) -> Floats:
-        springs = super()._springs_after(problem, solution, flowing)
+    def _springs_after(self, problem: Problem, solution: Solution) -> Floats:
+        springs = super()._springs_after(problem, solution)
         assert self._driven is not None
-        led = self.settings.step * self._driven.take(flowing, 0)
-        parents = self._bodies.parent_matrices.take(flowing, 0)
-        return springs - (led[:, None, :] @ parents)[:, 0]
+        led = self.settings.step * self._driven
+        return springs - (led[:, None, :] @ self._bodies.parent_matrices)[:, 0]

@@ -152,6 +152,8 @@ class Pattern:
         if holds is not None:
             self.gains = np.concatenate([self.contact_gains, holds.gains])
             self.turning = count + np.flatnonzero(holds.turns)
+            self.unbound = np.ones(len(holds))
+            """(holds,) shares of impulses that are within their bounds."""
         # As deep as what rests with twice the figure's weight on one point: so far the contact is a
         # spring. What is deeper is made good by ``corrections``.
         self.deepest = -2.0 * _WEIGHT * step * whole / self.contact_gains
@@ -316,10 +318,10 @@ class Rows:
         if holds is None:
             return RowImpulses(wanted, impulses, *self._touch(wanted, impulses), _NO_ONES)
         pulls = wanted[count:]
-        held = holds.bounds / (np.sqrt((pulls * pulls) @ _ONES) + _TINY)
-        full = bool(np.count_nonzero(held < 1.0))
-        np.minimum(held, 1.0, out=held)
+        square, held = (pulls * pulls) @ _ONES, self.pattern.unbound
+        full = bool(np.count_nonzero(square > holds.bounds * holds.bounds))
         if full:
+            held = np.minimum(holds.bounds / (np.sqrt(square) + _TINY), 1.0)
             np.multiply(pulls, held[:, None], out=impulses[count:])
         else:
             impulses[count:] = pulls
@@ -340,9 +342,10 @@ class Rows:
         if not np.count_nonzero(slips):
             np.multiply(y, sticks[:, None], out=impulses)
             return sticks, None, across, size, sticks
-        # What neither sticks nor slips is apart.
-        load = np.where(sticks, push, slips * (self.pattern.spread * lift))
-        shares = np.where(sticks, 1.0, friction * load / (size + _TINY))
+        # The greater one is y_n where it sticks, and neither is above zero where it is apart.
+        load = np.maximum(push, self.pattern.spread * lift)
+        np.maximum(load, 0.0, out=load)
+        shares = np.minimum(friction * load / (size + _TINY), 1.0)
         np.multiply(normals, load[:, None], out=impulses)
         impulses += shares[:, None] * across
         return sticks, slips, across, size, shares
@@ -359,7 +362,7 @@ class Rows:
             return Tangent(shares, None, None, sticks)
         planes = np.empty((len(self), 3, 3))
         if count:
-            planes[:count] = self._cones(answer)
+            self._cones(answer, planes[:count])
         rest = None
         if holds is not None:
             held = answer.held
@@ -374,10 +377,11 @@ class Rows:
                 rest[count:] = np.where((held < 1.0)[:, None], pulls, 0.0)
         return Tangent(None, planes, rest, sticks)
 
-    def _cones(self, answer: RowImpulses) -> Floats:
-        """P′ of the contacts (contacts, 3, 3)."""
+    def _cones(self, answer: RowImpulses, planes: Floats) -> None:
+        """Fill in P′ of the contacts (contacts, 3, 3)."""
+        np.multiply(answer.sticks[:, None, None], _UNIT, out=planes)
         if answer.slips is None:
-            return answer.sticks[:, None, None] * _UNIT
+            return
         contacts, pattern = self.contacts, self.pattern
         # Along n + μ t with 1/(1 + μ²), sideways of both with |p_t|/|y_t|.
         toward = answer.across / (answer.size + _TINY)[:, None]
@@ -387,9 +391,7 @@ class Rows:
         aside = np.sqrt(answer.slips * answer.shares)
         sideways = (pattern.crossing(contacts.normals) @ toward[:, :, None])[:, :, 0]
         np.multiply(sideways, aside[:, None], out=ways[:, :, 1])
-        planes = ways @ ways.transpose(0, 2, 1)
-        planes += answer.sticks[:, None, None] * _UNIT
-        return planes
+        planes += ways @ ways.transpose(0, 2, 1)
 
     def corrections(self, fastest: float) -> Floats | None:
         """Velocities (rows, 3) that make good what has slipped in; None where nothing has.

@@ -141,25 +141,28 @@ class HoldBuilder:
         gain = _PIN_GAIN * mass
         self._pin_laws: tuple[_Law, _Law] = ((gain, 0.0, np.inf), (gain * size**2, 0.0, np.inf))
         self._step = step
-        self._key: tuple[object, ...] = ()
+        self._key: list[tuple[int, bool, Coupling | None]] = []
 
     def rows(self, bodies: Bodies, holds: Sequence[Hold]) -> Holds | None:
         """What holds the bodies where they are now; None where nothing does."""
         if not holds:
             return None
-        key = tuple((hold.body, hold.turns, getattr(hold, "coupling", None)) for hold in holds)
+        key = [
+            (each.body, each.turns, each.coupling if isinstance(each, HandSpring) else None)
+            for each in holds
+        ]
         if key != self._key:
-            self._arrange(holds)
+            self._arrange(key)
             self._key = key
         # Points: where they are, where they are wanted, and how fast that moves.
         locals_, targets, speeds = self._places
         row = 0
-        for hold in holds:
+        for hold, (_, turns, _) in zip(holds, key, strict=True):
             locals_[row] = hold.point
             targets[row] = hold.target_position
             speeds[row] = hold.target_velocity[:3]
             row += 1
-            if hold.turns:
+            if turns:
                 speeds[row] = hold.target_velocity[3:]
                 row += 1
         held = self._bodies
@@ -190,24 +193,24 @@ class HoldBuilder:
         """Let hands feel the impulses (rows, 3) of the last ``rows``."""
         if not springs:
             return
-        counts = [1 + spring.turns for spring in springs]
-        hands = impulses[len(self._bodies) - sum(counts) :] / self._step
-        row = 0
-        for spring, count in zip(springs, counts, strict=True):
+        hands = (impulses / self._step).ravel()
+        end = len(hands)
+        # They come last.
+        for spring, (_, turns, _) in zip(reversed(springs), reversed(self._key), strict=False):
+            size = 6 if turns else 3
+            end -= size
             wrench = np.zeros(6)
-            wrench[: 3 * count] = hands[row : row + count].ravel()
+            wrench[:size] = hands[end : end + size]
             spring.wrench = wrench
-            row += count
 
-    def _arrange(self, holds: Sequence[Hold]) -> None:
+    def _arrange(self, holds: Sequence[tuple[int, bool, Coupling | None]]) -> None:
         """What stays the same as long as the same bodies are held."""
         # Body, whether a turn, gain, stiffness, bound, whether a pin.
         rows: list[tuple[int, bool, float, float, float, bool]] = []
-        for hold in holds:
-            coupling = hold.coupling if isinstance(hold, HandSpring) else None
+        for body, turns, coupling in holds:
             laws = self._pin_laws if coupling is None else self._laws(coupling)
-            for turn, law in zip((False, True) if hold.turns else (False,), laws, strict=False):
-                rows.append((hold.body, turn, *law, coupling is None))
+            for turn, law in zip((False, True) if turns else (False,), laws, strict=False):
+                rows.append((body, turn, *law, coupling is None))
         held, turns, gains, stiff, bounds, pinned = zip(*rows, strict=True)
         self._bodies = np.array(held)
         self._turns_held = np.array(turns)

@@ -22,7 +22,7 @@ import numpy as np
 
 from ...errors import SettingsError
 from ...rotations import IDENTITY, Floats, conjugate, multiply, normalized, rotate
-from ..puppet import Elements, Figure, Flags, Integers, Pose, law_of, part_of
+from ..puppet import Elements, Figure, Flags, Pose, law_of, part_of
 from .bodies import Bodies
 from .constraint_rows import Pattern, Rows
 from .contact_detection import NO_CONTACTS, Contacts, Detector, apart_at
@@ -352,19 +352,19 @@ class World:
         speeds, turning = solution.speeds, solution.velocities[:, :3]
         response, springs = solution.response, None
         if response.flows is not None:
-            springs = self._springs_after(problem, solution, response.which)
+            springs = self._springs_after(problem, solution)
         if solution.moving is not None:
             speeds = solution.moving
             turning = tree.from_roots(speeds.take(tree.joint_slot, 0))
         # A spring is at q_f then; its rest moves by what flowed.
-        bodies.move(h * turning, h * speeds.take(tree.shift_slot, 0), springs, response.which)
+        bodies.move(h * turning, h * speeds.take(tree.shift_slot, 0), springs, response.flows)
 
-    def _springs_after(self, problem: Problem, solution: Solution, flowing: Integers) -> Floats:
-        """(flowing, 3) q_f at the step's end in the parents' frames: eq. 21."""
-        change = solution.joint_speeds.take(flowing, 0) - solution.response.flows_with()
-        springs = problem.springs.take(flowing, 0) + self.settings.step * change
-        parents = self._bodies.parent_matrices.take(flowing, 0)
-        return (springs[:, None, :] @ parents)[:, 0]
+    def _springs_after(self, problem: Problem, solution: Solution) -> Floats:
+        """(bodies, 3) q_f at the step's end in the parents' frames: eq. 21."""
+        springs = solution.joint_speeds - solution.response.flows_with()
+        springs *= self.settings.step
+        springs += problem.springs
+        return (springs[:, None, :] @ self._bodies.parent_matrices)[:, 0]
 
     def _use_elements(self) -> None:
         works = ~self._bodies.is_root
