@@ -59,7 +59,7 @@ def test_texts_that_are_registered_drawn_and_reported_are_all_found() -> None:
         "Save as Preset…",  # a button's own words
         "'{armature}' has no route.",  # an error
         "Select an armature.",  # what to do about it
-        "Marked {count} bones.",  # a report
+        "Marked {bones}.",  # a report
         "key touched",  # a key in the status bar
         "left upper arm",  # a part of a sentence
         "Jet Escape",  # a set-up

@@ -176,12 +176,18 @@ def even_scale(armature: bpy.types.Object) -> float:
     """The scale of an object, which must be the same in all directions.
 
     Raises:
-        RigError: it is not, or zero, or negative, or sheared.
+        RigError: it is not, or zero, or negative, or sheared; or the object is nowhere.
     """
-    matrix = np.array(armature.matrix_world, dtype=np.float64)[:3, :3]
+    world = np.array(armature.matrix_world, dtype=np.float64)
+    matrix = world[:3, :3]
     sizes = np.linalg.norm(matrix, axis=0)
     name = f"'{armature.name}'"
-    if not np.isfinite(matrix).all() or sizes.min() <= 1e-9 * max(1.0, sizes.max()):
+    if not np.isfinite(world).all():
+        raise RigError(
+            phrase("{name} is at an undefined position.", name=name),
+            "Clear its location, rotation and scale (Object > Clear).",
+        )
+    if sizes.min() <= 1e-9 * max(1.0, sizes.max()):
         raise RigError(
             phrase("{name} has no size.", name=name), "Give it a scale greater than zero."
         )

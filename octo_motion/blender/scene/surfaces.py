@@ -168,7 +168,12 @@ def read_obstacle(item: bpy.types.Object, kind: str, unit: float) -> Obstacle:
     shown = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
     world = np.array(shown.matrix_world, dtype=np.float64)
     sizes = np.linalg.norm(world[:3, :3], axis=0)
-    if not np.isfinite(world).all() or sizes.min() <= 0.0:
+    if not np.isfinite(world).all():
+        raise RigError(
+            phrase("The obstacle '{item}' is at an undefined position.", item=item.name),
+            "Clear its location, rotation and scale (Object > Clear).",
+        )
+    if sizes.min() <= 0.0:
         raise RigError(
             phrase("The obstacle '{item}' has no size.", item=item.name), "Repair its scale."
         )

@@ -16,6 +16,10 @@ FORMAT: Final = "octo_motion.pose"
 VERSION: Final = 1
 LONGEST: Final = 600.0
 """Seconds of one step: more is a slip of the pen."""
+FARTHEST: Final = 1e6
+"""Metres and degrees of one step, likewise."""
+LAST_FRAME: Final = 1048574
+"""Of a scene of Blender."""
 
 Vector = tuple[float, float, float]
 
@@ -89,7 +93,7 @@ def parse_script(text: str, name: str) -> PoseScript:
     """
     try:
         data = json.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise SettingsError(
             phrase("'{name}' is not JSON: {error}.", name=name, error=error), "Repair it there."
         ) from None
@@ -183,15 +187,18 @@ def _number(value: Any) -> float | None:
     return float(value)
 
 
-def _whole(value: Any) -> int | None:
-    return value if isinstance(value, int) and not isinstance(value, bool) else None
+def _frame_number(value: Any) -> int | None:
+    whole = isinstance(value, int) and not isinstance(value, bool)
+    return value if whole and abs(value) <= LAST_FRAME else None
 
 
 def _vector(value: Any) -> Vector | None:
     if not isinstance(value, list) or len(value) != 3:
         return None
     x, y, z = map(_number, value)
-    return None if x is None or y is None or z is None else (x, y, z)
+    if x is None or y is None or z is None:
+        return None
+    return (x, y, z) if max(abs(x), abs(y), abs(z)) <= FARTHEST else None
 
 
 def _names(value: Any) -> str | tuple[str, ...] | None:
@@ -209,7 +216,7 @@ _READERS: Final[dict[str, Callable[[Any], Any]]] = {
     "to": _vector,
     "turn": _vector,
     "seconds": _number_up_to(LONGEST),
-    "frame": _whole,
+    "frame": _frame_number,
     "bones": _names,
     "hand": _text,
     "meanwhile": _yes_or_no,

@@ -27,7 +27,7 @@ from ..language import reported
 from ..operator_base import ArmatureOperator, OctoOperator
 from .measuring_hand import BEARS, check_joint, coefficients, measured_joint
 from .properties import MOVES, OBSTACLES, STANDS, posing_settings
-from .puppet_session import PuppetSession, active_session
+from .puppet_session import PuppetSession, active_session, counted_bones, counted_objects
 from .session_settings import joints_of_now, keep_material
 
 
@@ -56,7 +56,9 @@ class OCTO_MOTION_OT_pose_asset(ArmatureOperator, bpy.types.Operator):
             # A picture of it, which Blender draws in its own time.
             made.asset_generate_preview()
         told = phrase(
-            "'{name}' is in the pose library: {count} bones.", name=made.name, count=len(names)
+            "'{name}' is in the pose library: {bones}.",
+            name=made.name,
+            bones=counted_bones(len(names)),
         )
         self.report({"INFO"}, reported(told))
 
@@ -95,7 +97,7 @@ class OCTO_MOTION_OT_pose_mark_bones(ArmatureOperator, bpy.types.Operator):
                 "Mark them in the linked file.",
             )
         mark_bones(armature, list(names), "" if self.mark == "AUTO" else self.mark)
-        self.report({"INFO"}, reported(phrase("Marked {count} bones.", count=len(names))))
+        self.report({"INFO"}, reported(phrase("Marked {bones}.", bones=counted_bones(len(names)))))
 
 
 class OCTO_MOTION_OT_pose_obstacle(OctoOperator, bpy.types.Operator):
@@ -118,7 +120,9 @@ class OCTO_MOTION_OT_pose_obstacle(OctoOperator, bpy.types.Operator):
         for item in chosen:
             own: Any = item
             own.octo_motion.posing.obstacle = self.kind
-        self.report({"INFO"}, reported(phrase("Marked {count} objects.", count=len(chosen))))
+        self.report(
+            {"INFO"}, reported(phrase("Marked {objects}.", objects=counted_objects(len(chosen))))
+        )
 
 
 class OCTO_MOTION_OT_pose_loose(OctoOperator, bpy.types.Operator):
@@ -153,7 +157,9 @@ class OCTO_MOTION_OT_pose_loose(OctoOperator, bpy.types.Operator):
                 settings.mass = self.mass
                 if settings.obstacle in {"NONE", "PLANE"}:
                     settings.obstacle = "HULL" if item.type == "MESH" else "BOX"
-        self.report({"INFO"}, reported(phrase("Marked {count} objects.", count=len(chosen))))
+        self.report(
+            {"INFO"}, reported(phrase("Marked {objects}.", objects=counted_objects(len(chosen))))
+        )
 
 
 def _solid_objects(context: bpy.types.Context) -> list[bpy.types.Object]:
@@ -392,7 +398,9 @@ class OCTO_MOTION_OT_pose_forget_measured(ArmatureOperator, bpy.types.Operator):
             session.read_materials()
         self.report(
             {"INFO"},
-            reported(phrase("{count} bones are of the figure's material again.", count=len(own))),
+            reported(
+                phrase("Of the figure's material again: {bones}.", bones=counted_bones(len(own)))
+            ),
         )
 
 

@@ -412,7 +412,7 @@ class RecordedPuppet(KeyedPuppet):
             bones, frames = self.stop_record()
             return phrase(
                 "Recorded {bones} on {frames}",
-                bones=_bones(bones),
+                bones=counted_bones(bones),
                 frames=_key_frames(frames),
             )
         self.record()
@@ -717,15 +717,21 @@ class PuppetSession(RecordedPuppet):
 
 def _bones_and_things(bones: int, things: int) -> str:
     if not things:
-        return _bones(bones)
-    objects = phrase("1 object") if things == 1 else phrase("{count} objects", count=things)
+        return counted_bones(bones)
+    objects = counted_objects(things)
     if not bones:
         return objects
-    return phrase("{bones} and {objects}", bones=_bones(bones), objects=objects)
+    return phrase("{bones} and {objects}", bones=counted_bones(bones), objects=objects)
 
 
-def _bones(count: int) -> str:
+def counted_bones(count: int) -> str:
+    """So many bones, in words."""
     return phrase("1 bone") if count == 1 else phrase("{count} bones", count=count)
+
+
+def counted_objects(count: int) -> str:
+    """So many objects, in words."""
+    return phrase("1 object") if count == 1 else phrase("{count} objects", count=count)
 
 
 def _key_frames(count: int) -> str:

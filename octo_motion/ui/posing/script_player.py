@@ -21,7 +21,7 @@ from ...core.rotations import IDENTITY, Floats, from_rotation_vector, multiply
 from ..language import reported
 from ..operator_base import ArmatureOperator, FileOperator
 from .properties import posing_settings
-from .puppet_session import PuppetSession
+from .puppet_session import PuppetSession, counted_bones
 
 TICK: Final = 1.0 / 60.0
 """Seconds: a script moves the hand as often as the mouse does."""
@@ -298,6 +298,10 @@ class OCTO_MOTION_OT_pose_script(FileOperator, ArmatureOperator, bpy.types.Opera
         self.report(
             {"INFO"},
             reported(
-                phrase("Played '{path}': {keys} bones keyed.", path=path.name, keys=player.keys)
+                phrase(
+                    "Played '{path}': keyed {bones}.",
+                    path=path.name,
+                    bones=counted_bones(player.keys),
+                )
             ),
         )

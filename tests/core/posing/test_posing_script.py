@@ -57,6 +57,9 @@ def test_script_is_read_step_by_step() -> None:
         ),
         ({"do": "pull", "by": [0, 1], "seconds": 1}, "'by' that makes no sense"),
         ({"do": "pull", "by": [0, 1, True], "seconds": 1}, "'by' that makes no sense"),
+        ({"do": "pull", "by": [0, 0, 1e300], "seconds": 1}, "'by' that makes no sense"),
+        ({"do": "pull", "turn": [1e200, 0, 0], "seconds": 1}, "'turn' that makes no sense"),
+        ({"do": "frame", "frame": 10**12}, "'frame' that makes no sense"),
         ({"do": "wait", "seconds": -1}, "'seconds' that makes no sense"),
         ({"do": "wait", "seconds": 1e9}, "'seconds' that makes no sense"),
         ({"do": "frame", "frame": 1.5}, "'frame' that makes no sense"),
@@ -79,6 +82,7 @@ def test_not_a_number_is_refused() -> None:
     ("text", "what"),
     [
         ("{", "'wave.json' is not JSON"),
+        ("[" * 100_000, "'wave.json' is not JSON"),
         ("[]", "no script of posing"),
         ('{"format": "octo_motion.gait", "version": 1}', "no script of posing"),
         ('{"format": "octo_motion.pose", "version": 2}', "has format version 2"),

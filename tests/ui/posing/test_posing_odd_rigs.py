@@ -250,6 +250,27 @@ def test_pose_that_is_no_pose_is_refused() -> None:
         PuppetSession(armature, bpy.context.scene)
 
 
+def test_armature_and_obstacle_that_are_nowhere_are_told() -> None:
+    armature = chain()
+    item = bpy.data.objects.new("Lost", None)
+    bpy.context.collection.objects.link(item)
+    item.octo_motion.posing.obstacle = "BOX"
+    item.location.x = NAN
+    bpy.context.view_layer.update()
+    with pytest.raises(RigError, match="The obstacle 'Lost' is at an undefined position"):
+        PuppetSession(armature, bpy.context.scene)
+    item.location.x = 0.0
+    bpy.context.view_layer.update()
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    armature.location.x = NAN
+    bpy.context.view_layer.update()
+    with pytest.raises(RigError, match="'Rig' is at an undefined position"):
+        session.tick(TICK)
+    session.cancel()
+    with pytest.raises(RigError, match="'Rig' is at an undefined position"):
+        PuppetSession(armature, bpy.context.scene)
+
+
 def test_bone_that_is_scaled_to_nothing_keeps_nobody_from_posing() -> None:
     armature = chain()
     armature.pose.bones["shin"].scale = (0.0, 0.0, 0.0)
