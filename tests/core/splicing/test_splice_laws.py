@@ -231,6 +231,38 @@ def test_trunk_and_head_seen_from_the_pelvis_take_the_whole_orientation():
     assert np.allclose(relative(result, "hand.L", "hips"), relative(clip, "hand.L", "hips"))
 
 
+@pytest.mark.parametrize("part", [LEGS, RIGHT_ARM, TRUNK])
+def test_bones_of_another_body_stay_as_long_as_its_own(part: Part):
+    # A game character's controls tear feet off shins: on a person, whose bones may be connected
+    # in one file and not in the next, that is neither wanted nor to be played everywhere.
+    random = np.random.default_rng(8)
+    base = motion(random, humanoid(random))
+    clip = motion(random, humanoid(random, same_proportions=False))
+    moving = clip.locations + random.normal(0.0, 0.1, clip.locations.shape)
+    torn = replace(clip, locations=moving)
+    connected = replace(base.skeleton, connected=tuple(each >= 0 for each in base.skeleton.parents))
+    for each in (clip, torn):
+        splice = Splice(part, each, FROM_START, LANDMARKS)
+        result = spliced(base, LANDMARKS, splice)
+        assert np.array_equal(result.locations, base.locations)
+        fixed = spliced(replace(base, skeleton=connected), LANDMARKS, splice)
+        assert np.array_equal(fixed.rotations, result.rotations)
+
+
+def test_bones_of_the_same_body_stretch_as_in_the_clip_unless_they_cannot():
+    random = np.random.default_rng(9)
+    base = motion(random, humanoid(random))
+    clip = motion(random, base.skeleton)
+    foot = base.skeleton.index["foot.R"]
+    clip.locations[:, foot] = random.normal(0.0, 0.1, (len(clip), 3))
+    splice = Splice(LEGS, clip, FROM_START, LANDMARKS)
+    result = spliced(base, LANDMARKS, splice)
+    assert np.abs(result.locations[:, foot] - clip.locations[:, foot]).max() < 1e-9
+    fixed = [bone == foot for bone in range(len(base.skeleton))]
+    held = replace(base, skeleton=replace(base.skeleton, connected=tuple(fixed)))
+    assert not spliced(held, LANDMARKS, splice).locations[:, foot].any()
+
+
 def test_a_stack_is_rebuilt_retimed_and_reordered_as_data():
     random = np.random.default_rng(6)
     skeleton = humanoid(random)

@@ -232,6 +232,8 @@ class Retarget:
     then the first one's turn alone does not tell where the head is."""
     same_build: bool = False
     """Whether the two bodies are the same, up to one factor: not just the part's bones."""
+    chain: bool = False
+    """Whether the part is no humanoid's: a tail, an octopus arm."""
 
     @cached_property
     def joined(self) -> _JoinedBones | None:
@@ -264,19 +266,6 @@ class Retarget:
         ours, theirs = self.limb
         longer = chain_length(self.base.skeleton, ours)
         return longer / max(chain_length(self.splice.skeleton, theirs), 1e-12)
-
-    @cached_property
-    def size(self) -> float:
-        """How much larger the base's part is: as a limb, or as the whole body."""
-        if self.limb is not None:
-            return self.ratio
-        spans = [
-            chain_length(each.skeleton, [each.bone(name) for name in ("hips", "chest", "head")])
-            if each.landmarks is not None
-            else 1.0
-            for each in (self.base, self.splice)
-        ]
-        return spans[0] / max(spans[1], 1e-12)
 
     @cached_property
     def hinge(self) -> Floats:
@@ -494,18 +483,20 @@ def _write_inner(
 def _write_locations(
     retarget: Retarget, between: Floats, splice: Posture, result: Posture, locations: Floats
 ) -> None:
-    """How bones have left their places: as in the splice clip, at the base's size. Bones that
-    answer to none there are where they rest.
+    """How bones have left their places: as in the splice clip on the same body and on chains, at
+    the base's size. On another body bones are as long as its own, and so are those that answer to
+    none there, or that cannot leave their parent: limbs are aimed by where joints come to lie.
     """
-    size = retarget.match.size if retarget.match.same_body else retarget.size
+    stretches = retarget.match.same_body or retarget.chain
+    fixed = retarget.base.skeleton.connected
     for bone in retarget.bones:
-        answer = retarget.match.pairs.get(bone)
+        answer = retarget.match.pairs.get(bone) if stretches and not fixed[bone] else None
         moved = None if answer is None else splice.location(answer)
         if answer is None or moved is None or not moved.any():
             locations[:, bone] = 0.0
             continue
         seen = rotate(multiply(between, splice.location_axes(answer)), moved)
-        locations[:, bone] = size * rotate(conjugate(result.location_axes(bone)), seen)
+        locations[:, bone] = retarget.match.size * rotate(conjugate(result.location_axes(bone)), seen)
 
 
 def _write_spread(
@@ -694,7 +685,7 @@ def _chain_retarget(part: Part, base: MappedClip, splice: MappedClip) -> Retarge
     match = find_correspondence(
         base.skeleton, splice.skeleton, pairs, rests, (None, None), aim_all=True
     )
-    return Retarget(base, splice, tuple(bones), frames, match, None, spread)
+    return Retarget(base, splice, tuple(bones), frames, match, None, spread, chain=True)
 
 
 def _single(skeleton: Skeleton, bones: Sequence[int]) -> bool:
