@@ -487,7 +487,7 @@ def _write_locations(
     the base's size. On another body bones are as long as its own, and so are those that answer to
     none there, or that cannot leave their parent: limbs are aimed by where joints come to lie.
     """
-    stretches = retarget.match.same_body or retarget.chain
+    size, stretches = retarget.match.size, retarget.match.same_body or retarget.chain
     fixed = retarget.base.skeleton.connected
     for bone in retarget.bones:
         answer = retarget.match.pairs.get(bone) if stretches and not fixed[bone] else None
@@ -496,7 +496,7 @@ def _write_locations(
             locations[:, bone] = 0.0
             continue
         seen = rotate(multiply(between, splice.location_axes(answer)), moved)
-        locations[:, bone] = retarget.match.size * rotate(conjugate(result.location_axes(bone)), seen)
+        locations[:, bone] = size * rotate(conjugate(result.location_axes(bone)), seen)
 
 
 def _write_spread(
