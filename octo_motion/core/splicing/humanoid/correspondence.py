@@ -197,16 +197,14 @@ def find_correspondence(
             # How a limb lies along its own plane does not hang on where the body's frames are.
             on_limbs.add(bone)
         our_back, their_back = (IDENTITY, IDENTITY) if bone in on_limbs else backs
-        follower = _follower(base, bone, pairs, marks, landmark)
-        if follower is not None:
-            ours = rotate(our_back, base.heads[follower] - base.heads[bone])
-            theirs = rotate(their_back, splice.heads[pairs[follower]] - splice.heads[other])
-            ours, theirs = normalized(ours), normalized(rotate(lay, theirs))
+        ways = next(_ways(base, splice, pairs, bone, _followers(base, bone, marks, landmark)), None)
+        if ways is not None:
+            ours, theirs = (rotate(our_back, ways[0]), rotate(lay, rotate(their_back, ways[1])))
             # Clavicles, feet, spines and heads are built differently, but hang on alike at rest:
             # unless one rest pose is none to stand in.
             same = same_with_clavicles if bone in clavicles else same_body
             aimed = aim_all or same or kind in _AIMED or not kind or np.dot(ours, theirs) < _UNLIKE
-            if aimed and np.any(ours) and np.any(theirs):
+            if aimed:
                 lay = multiply(shortest_arc(theirs, ours), lay)
         elif kind == "foot" and marks is not None and others is not None:
             feet = _Foot(base, marks, bone, side), _Foot(splice, others, other, side)
@@ -309,21 +307,33 @@ def _plain(name: str) -> str:
     return name.rpartition(":")[2].casefold()
 
 
-def _follower(
-    base: Skeleton,
-    bone: int,
-    pairs: Mapping[int, int],
-    landmarks: Landmarks | None,
-    landmark: str,
-) -> int | None:
-    """The matched bone at whose head this one ends."""
+def _followers(
+    base: Skeleton, bone: int, landmarks: Landmarks | None, landmark: str
+) -> Iterator[int]:
+    """Bones at whose heads this one may end, the likeliest first."""
     kind, _, side = landmark.partition(".")
     if landmarks is not None and kind in _NEXT:
         following = f"{_NEXT[kind]}.{side}" if side else _NEXT[kind]
-        number = base.index.get(landmarks.get(following) or "", -1)
-        if number in pairs:
-            return number
-    return next((child for child in base.children[bone] if child in pairs), None)
+        yield base.index.get(landmarks.get(following) or "", -1)
+    yield from base.children[bone]
+
+
+def _ways(
+    base: Skeleton, splice: Skeleton, pairs: Mapping[int, int], bone: int, ends: Iterator[int]
+) -> Iterator[tuple[Floats, Floats]]:
+    """Directions (3,) on base and splice from a bone's joint to those of matched ones. A finger
+    that begins where its hand does shows none, but that of rounding.
+    """
+    for end in ends:
+        if end not in pairs:
+            continue
+        ours = base.heads[end] - base.heads[bone]
+        theirs = splice.heads[pairs[end]] - splice.heads[pairs[bone]]
+        if all(
+            np.linalg.norm(way) > _REST * np.ptp(skeleton.heads, axis=0).max()
+            for way, skeleton in ((ours, base), (theirs, splice))
+        ):
+            yield normalized(ours), normalized(theirs)
 
 
 def _same_body(base: Skeleton, splice: Skeleton, pairs: Mapping[int, int]) -> tuple[bool, float]:
