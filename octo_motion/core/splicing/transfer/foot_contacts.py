@@ -23,6 +23,10 @@ ANKLE: Final = 0
 BALL: Final = 1
 """The points of a foot, in the order of arrays."""
 
+_FINE: Final = 120.0
+"""Moments per second at which feet are looked at, about: between frames too, so that a motion says
+the same at any frame rate."""
+
 _SLOW: Final = 0.14
 """Leg lengths per second: a point that stands is slower than this at some time, …"""
 
@@ -67,13 +71,15 @@ class FootPaths:
     """Where feet are in the world; axis 1 is left and right, axis 2 ankle and ball."""
 
     points: Floats
-    """(frames, 2, 2, 3)"""
+    """(moments, 2, 2, 3)"""
     leg: float
     """Length of a leg, world units."""
     rate: float
-    """Frames per second."""
+    """Moments per second."""
     hips: Floats
-    """(frames, 2, 3) hip joints."""
+    """(moments, 2, 3) hip joints."""
+    moments: Floats
+    """(moments,) in the clip's frame numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,11 +87,19 @@ class FootContacts:
     """Which points of the feet stand; axes as in :class:`FootPaths`."""
 
     held: np.ndarray
-    """(frames, 2, 2) bool"""
+    """(moments, 2, 2) bool"""
 
-    def taken(self, rows: np.ndarray) -> FootContacts:
-        """Of some frames."""
-        return FootContacts(self.held[rows])
+
+def fine_moments(frames: Floats, rate: float) -> Floats:
+    """Moments (moments,) from the first to the last of some frames, evenly apart and all frames
+    among them if these are; of a clip of so many frames a second.
+    """
+    if len(frames) < 2:
+        return frames
+    pace = float(np.median(np.diff(frames)))
+    parts = max(1, round(_FINE * pace / rate))
+    count = int(np.ceil((frames[-1] - frames[0]) / pace * parts - 1e-6))
+    return frames[0] + np.arange(count + 1.0) * (pace / parts)
 
 
 def foot_bones(mapped: MappedClip, side: str) -> tuple[int, int, int, int]:
@@ -120,22 +134,22 @@ def ball_places(mapped: MappedClip) -> Floats:
 
 
 def foot_paths(
-    mapped: MappedClip, posture: Posture, frames: Floats, balls: Floats | None = None
+    mapped: MappedClip, posture: Posture, moments: Floats, balls: Floats | None = None
 ) -> FootPaths:
-    """Where the feet are at some frames of a clip, whose posture there is given.
+    """Where the feet are at some moments of a clip, whose posture there is given.
 
     Args:
         mapped: the clip.
-        posture: at those frames.
-        frames: (frames,)
+        posture: at those moments.
+        moments: (moments,)
         balls: (2, 3) where the balls of the feet are if elsewhere than :func:`ball_places` says.
 
     Raises:
         ClipError: a landmark is missing.
     """
     clip = mapped.clip
-    turns, shifts, scale = sample_world(clip, frames)
-    points, hips = np.empty((len(frames), 2, 2, 3)), np.empty((len(frames), 2, 3))
+    turns, shifts, scale = sample_world(clip, moments)
+    points, hips = np.empty((len(moments), 2, 2, 3)), np.empty((len(moments), 2, 3))
     balls = ball_places(mapped) if balls is None else balls
     leg = 0.0
     for side, name in enumerate("LR"):
@@ -146,14 +160,15 @@ def foot_paths(
         along = rotate(posture.orientation(foot), balls[side])
         for number, place in ((ANKLE, ankle), (BALL, ankle + along)):
             points[:, side, number] = shifts + scale * rotate(turns, place)
-    pace = float(np.median(np.diff(frames))) if len(frames) > 1 else 1.0
-    return FootPaths(points, leg, clip.rate / pace, hips)
+    pace = float(np.median(np.diff(moments))) if len(moments) > 1 else 1.0
+    return FootPaths(points, leg, clip.rate / pace, hips, moments)
 
 
 def own_paths(mapped: MappedClip, balls: Floats | None = None) -> FootPaths:
-    """Where the feet of a clip are at all its frames."""
+    """Where the feet of a clip are, at its frames and between them."""
     clip = mapped.clip
-    return foot_paths(mapped, sample_clip(clip, clip.frames), clip.frames, balls)
+    moments = fine_moments(clip.frames, clip.rate)
+    return foot_paths(mapped, sample_clip(clip, moments), moments, balls)
 
 
 def find_contacts(paths: FootPaths) -> FootContacts:

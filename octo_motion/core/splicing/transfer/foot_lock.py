@@ -5,8 +5,8 @@ After Kovar, Schreiner and Gleicher, "Footskate Cleanup for Motion Capture Editi
 foot is flat, ankle and ball stay where they are; while its heel lifts the ball alone stays, and the
 foot turns about it. Between two stances the way that a foot had to be moved changes smoothly from
 one to the other, as fast at both ends as it did there. Where a leg is too short to reach, the
-pelvis comes down in time, and where it would have to fold too tightly, it rises. All frames are
-worked out at once.
+pelvis comes down in time, and where it would have to fold too tightly, it rises. All of it is
+worked out at once, at moments that lie close whatever the frame rate is; frames take what is there.
 """
 
 from __future__ import annotations
@@ -27,11 +27,12 @@ from ...rotations import (
     normalized,
     rotate,
     shortest_arc,
+    slerp,
     to_rotation_vector,
 )
 from ...smoothing import blur_reach, blurred, covered, widened
 from ...steps import finished
-from ..clip import Clip, Posture, posture_of, sample_world
+from ..clip import Clip, Posture, posture_of, sample_clip, sample_world
 from .foot_contacts import (
     ANKLE,
     BALL,
@@ -39,6 +40,7 @@ from .foot_contacts import (
     FootPaths,
     Stance,
     ball_places,
+    fine_moments,
     foot_bones,
     foot_paths,
     runs,
@@ -99,32 +101,55 @@ class Footing:
     """On what feet are to stand, and when."""
 
     contacts: FootContacts
-    """When they do, frame by frame of the result."""
+    """When they do, …"""
+    moments: Floats
+    """(moments,) … at these of their own clip."""
     stance: Stance
     """How the body stands; with a ground, above that."""
     steps: Floats
-    """(frames, 2) how much higher than usual each foot stands in its own clip, world units of the
+    """(moments, 2) how much higher than usual each foot stands in its own clip, world units of the
     result: stairs."""
+    shown: Floats
+    """(frames,) of their own clip that the result's frames show."""
     ground: GroundHeight | None = None
     """What it stands on; none for where its stance is."""
     balls: Floats | None = None
     """(2, 3) where the balls of the feet are as seen from their bones, if not as usual."""
     cyclic: bool = False
-    """Whether the result is a loop: contacts and steps are then those of three rounds."""
+    """Whether the result is a loop: contacts and steps are then those of three rounds, and what it
+    shows are its own frames."""
+
+    def at(self, frames: Floats, moments: Floats) -> Footing:
+        """As it is at some moments (moments,) of the result, which has these frames (frames,)."""
+        if self.cyclic:
+            return self
+        before, after, share = _beside(moments, frames)
+        # Where a clip begins anew nothing is shown between its end and its start.
+        share = np.where(self.shown[after] < self.shown[before], np.round(share), share)
+        shown = self.shown[before] + share * (self.shown[after] - self.shown[before])
+        last = len(self.moments) - 1
+        places = np.interp(shown, self.moments, np.arange(last + 1.0))
+        rows = np.clip(np.round(places), 0, last).astype(np.intp)
+        return replace(
+            self,
+            contacts=FootContacts(self.contacts.held[rows]),
+            moments=self.moments[rows],
+            steps=self.steps[rows],
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class _Leg:
-    """Bones of a leg, and where its joints are in the world, (frames, 3) each."""
+    """Bones of a leg, and where its joints are in the world, (moments, 3) each."""
 
     bones: tuple[int, int, int]
     joints: LimbTriangle
     goal: Floats
-    """(frames, 3) where the ankle is to be; before the body is brought along, while it stands."""
+    """(moments, 3) where the ankle is to be; before the body is brought along, while it stands."""
     turn: Floats
-    """(frames, 4) how the foot is to be turned more, world."""
+    """(moments, 4) how the foot is to be turned more, world."""
     standing: np.ndarray
-    """(frames,) whether it stands."""
+    """(moments,) whether it stands."""
 
     def taken(self, rows: slice) -> _Leg:
         """Of some frames."""
@@ -172,14 +197,17 @@ def locking_feet(
     """
     if len(clip) < 2 or not footing.contacts.held.any():
         return clip
-    posture = posture_of(clip.skeleton, clip.rotations, clip.locations)
+    moments = fine_moments(clip.frames, clip.rate)
+    posture = sample_clip(clip, moments)
     # The clip's own rate counts, not that of the one by which the body is known.
-    paths = foot_paths(replace(mapped, clip=clip), posture, clip.frames, footing.balls)
+    paths = foot_paths(replace(mapped, clip=clip), posture, moments, footing.balls)
     rounds = Rounds.between(paths.hips) if footing.cyclic else None
+    footing = footing.at(clip.frames, moments)
     share = np.ones(len(clip)) if weights is None else weights
+    share = np.interp(moments, clip.frames, share)
     share = (share if rounds is None else repeated(share))[:, None]
     yield
-    moved = _Legs(mapped, posture, clip, rounds)
+    moved = _Legs(mapped, posture, clip, moments, rounds)
     balls = ball_places(mapped) if footing.balls is None else footing.balls
     legs: list[_Leg] = []
     for side in range(2):
@@ -191,36 +219,56 @@ def locking_feet(
     yield
     carried = share * (carried - _lowered(legs, share * carried, paths.rate)[:, None] * _UP)
     if rounds is not None:
-        own = own_round(len(clip))
+        own = own_round(len(moments))
         legs, carried = [each.taken(own) for each in legs], carried[own]
-    return _written(mapped, clip, legs, carried)
+    return _written(mapped, clip, legs, carried, moments)
+
+
+def _beside(looks: Floats, times: Floats) -> tuple[np.ndarray, np.ndarray, Floats]:
+    """Rows of some times (times,) on either side of each look (looks,), and how far it is between;
+    what misses a time by rounding alone is that time.
+    """
+    last = len(times) - 1
+    places = np.interp(looks, times, np.arange(last + 1.0))
+    places = np.where(np.abs(places - np.round(places)) < 1e-6, np.round(places), places)
+    before = np.minimum(places.astype(np.intp), last)
+    return before, np.minimum(before + 1, last), places - before
 
 
 class _Legs:
-    """Legs of a clip in the world, of three rounds if it is a loop."""
+    """Legs of a clip in the world at some moments, of three rounds if it is a loop."""
 
     def __init__(
-        self, mapped: MappedClip, posture: Posture, clip: Clip, rounds: Rounds | None
+        self,
+        mapped: MappedClip,
+        posture: Posture,
+        clip: Clip,
+        moments: Floats,
+        rounds: Rounds | None = None,
     ) -> None:
         self._mapped, self._posture, self._rounds = mapped, posture, rounds
-        self._turns, self._shifts, self._scale = sample_world(clip, clip.frames)
+        self._turns, self._shifts, self._scale = sample_world(clip, moments)
 
     def bones(self, side: int) -> tuple[int, int, int]:
         """Thigh, shin and foot."""
         thigh, shin, foot, _ = foot_bones(self._mapped, "LR"[side])
         return thigh, shin, foot
 
+    def joints(self, side: int) -> LimbTriangle:
+        """Hip joint, knee and ankle."""
+        return LimbTriangle(*(self.place(bone) for bone in self.bones(side)))
+
     def place(self, bone: int) -> Floats:
-        """Where a bone begins, (frames, 3)."""
+        """Where a bone begins, (moments, 3)."""
         return self._all(self._shifts + self._scale * rotate(self._turns, self._posture.head(bone)))
 
     def orientation(self, bone: int) -> Floats:
-        """How a bone is turned, (frames, 4)."""
+        """How a bone is turned, (moments, 4)."""
         turned = multiply(self._turns, self._posture.orientation(bone))
         return turned if self._rounds is None else self._rounds.turns(turned)
 
     def along(self, foot: int, ball: Floats) -> Floats:
-        """(frames, 3) from ankle to ball, which is given as seen from the foot's bone."""
+        """(moments, 3) from ankle to ball, which is given as seen from the foot's bone."""
         return rotate(self.orientation(foot), self._scale * ball)
 
     def _all(self, points: Floats) -> Floats:
@@ -230,13 +278,14 @@ class _Legs:
 def _leg(legs: _Legs, footing: Footing, ball: Floats, rate: float, side: int) -> _Leg:
     """Where a foot is to be while it stands, and how it is turned."""
     bones = legs.bones(side)
-    joints = LimbTriangle(*(legs.place(bone) for bone in bones))
+    joints = legs.joints(side)
     along = legs.along(bones[2], ball)
     width = max(1, round(_APART * rate))
     held = _set_apart(footing.contacts.held[:, side], width)
     flat = held.all(axis=-1)
     flat &= ~_around(short_gaps(flat, 2 * width), width)
-    laid = _laid_flat(flat, legs.orientation(bones[2]), along, footing, side)
+    foot = joints.hand, legs.orientation(bones[2]), along
+    laid = _laid_flat(flat, foot, footing, side)
     turn = from_rotation_vector(bridged(laid, flat, *_lengths(rate)))
     shift = _planted(joints.hand, rotate(turn, along), held, footing, side)
     return _Leg(bones, joints, joints.hand + shift, turn, held.any(axis=-1))
@@ -275,11 +324,13 @@ def _around(mask: np.ndarray, width: int) -> np.ndarray:
 
 
 def _laid_flat(
-    flat: np.ndarray, orientation: Floats, along: Floats, footing: Footing, side: int
+    flat: np.ndarray, foot: tuple[Floats, Floats, Floats], footing: Footing, side: int
 ) -> Floats:
-    """Rotation vectors (frames, 3), world, that hold each flat foot still and lay it on the ground;
-    of no meaning where it is not flat.
+    """Rotation vectors (moments, 3), world, that hold each flat foot still and lay it on the
+    ground; of no meaning where it is not flat. Of the foot the ankle's place, how it is turned and
+    the way to its ball are given.
     """
+    ankle, orientation, along = foot
     starts, stops = runs(flat)
     result = np.zeros((len(flat), 3))
     if not len(starts):
@@ -290,14 +341,15 @@ def _laid_flat(
     off = to_rotation_vector(multiply(orientation[rows], conjugate(orientation[middle])))
     mean = _means(off, counts)
     # The foot's usual way, laid so that its ball is as high above its ankle as when it stands.
-    rest = rotate(from_rotation_vector(mean), along[starts + counts // 2])
+    center = starts + counts // 2
+    rest = rotate(from_rotation_vector(mean), along[center])
     length = np.maximum(np.linalg.norm(rest, axis=-1), 1e-12)
     rise = footing.stance.ball - footing.stance.ankle
     level = normalized(rest * _LEVEL)
     rise = np.clip(rise / length, -0.98, 0.98)
     wanted = level * np.sqrt(1.0 - rise**2)[:, None] + rise[:, None] * _UP
     if footing.ground is not None:
-        tilt = _tilt(footing.ground, rest)
+        tilt = _tilt(footing.ground, ankle[center] + 0.5 * rest)
         wanted = rotate(tilt, wanted)
     lay = shortest_arc(normalized(rest), wanted)
     # What is held high up, or steeply, is no sole on the ground.
@@ -446,25 +498,36 @@ def _width(rate: float) -> int:
     return max(1, round(_LOWERING * rate / blur_reach(1)))
 
 
-def _written(mapped: MappedClip, clip: Clip, legs: list[_Leg], carried: Floats) -> Clip:
-    """The clip with its hips moved and its legs where they go."""
+def _written(
+    mapped: MappedClip, clip: Clip, legs: list[_Leg], carried: Floats, moments: Floats
+) -> Clip:
+    """The clip with its hips moved and its legs where they go, which is known at some moments."""
     skeleton = clip.skeleton
     rotations, locations = clip.rotations.copy(), clip.locations.copy()
     turns, _, scale = sample_world(clip, clip.frames)
     back = conjugate(turns)
     hips = mapped.bone("hips")
     posture = posture_of(skeleton, clip.rotations, clip.locations)
+    before, after, share = _beside(clip.frames, moments)
+    share = share[:, None]
+
+    def there(values: Floats) -> Floats:
+        return values[before] + share * (values[after] - values[before])
+
+    own_legs = _Legs(mapped, posture, clip, clip.frames)
+    carried = there(carried)
     moved = rotate(back, carried) / scale
     locations[:, hips] += rotate(conjugate(posture.location_axes(hips)), moved)
-    for leg in legs:
-        joints = leg.joints
+    for side, leg in enumerate(legs):
+        joints = own_legs.joints(side)
+        goal = joints.hand + there(leg.goal - leg.joints.hand)
         limb = LimbTriangle(joints.joint + carried, joints.elbow + carried, joints.hand + carried)
-        aimed = shortest_arc(normalized(limb.hand - limb.joint), normalized(leg.goal - limb.joint))
+        aimed = shortest_arc(normalized(limb.hand - limb.joint), normalized(goal - limb.joint))
         turned = limb.turned(aimed)
         hinge = rotate(aimed, _hinge(limb, posture, leg, turns))
-        upper, lower = bend_to_reach(turned, leg.goal, hinge, soft=_SOFT)
+        upper, lower = bend_to_reach(turned, goal, hinge, soft=_SOFT)
         upper, lower = multiply(upper, aimed), multiply(lower, aimed)
-        world_turns = (upper, lower, leg.turn)
+        world_turns = (upper, lower, slerp(leg.turn[before], leg.turn[after], share[:, 0]))
         own = [multiply(multiply(back, each), turns) for each in world_turns]
         for bone, turn in zip(leg.bones, own, strict=True):
             wanted = multiply(turn, posture.orientation(bone))

@@ -12,7 +12,6 @@ import numpy as np
 from ...rotations import Floats, conjugate, multiply, rotate, slerp
 from ..clip import Clip, SpliceWindow
 from .foot_contacts import (
-    FootContacts,
     Stance,
     ball_places,
     find_contacts,
@@ -73,7 +72,7 @@ class TravelLock:
         contacts.held[:, [name not in sides for name in "LR"]] = False
         self._contacts = contacts
         self._steps = steps_of(paths, contacts, find_stance(paths), ratio)
-        self._frames = splice.clip.frames
+        self._moments = paths.moments
 
     def onto(self, result: Clip, span: SpliceWindow) -> Generator[None, None, Clip]:
         """The result of a splice with its feet held where the splice acts, in steps.
@@ -98,18 +97,16 @@ class TravelLock:
 
         Of its frames some may be missing: what lies between gaps is looked at by itself.
         """
-        last = len(self._frames) - 1
-        places = np.interp(span.splice_frames, self._frames, np.arange(last + 1.0))
-        rows = np.clip(np.round(places), 0, last).astype(np.intp)
         rotations, locations = result.rotations.copy(), result.locations.copy()
         steps = np.diff(result.frames[acting])
         gaps = np.flatnonzero(steps > _GAP * np.median(steps)) + 1 if len(steps) else []
         for chosen in np.split(np.arange(len(acting)), gaps):
-            held = rows[chosen]
             footing = Footing(
-                FootContacts(self._contacts.held[held]),
+                self._contacts,
+                self._moments,
                 self._stands,
-                self._steps[held],
+                self._steps,
+                span.splice_frames[chosen],
                 self._ground,
                 self._balls,
             )

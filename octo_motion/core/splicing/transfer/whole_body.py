@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -30,9 +31,10 @@ from ..clip import Clip, Reresting, posture_of, sample_clip
 from ..humanoid import Landmarks, chain_length
 from .foot_contacts import (
     FootContacts,
+    FootPaths,
+    Stance,
     find_contacts,
     find_stance,
-    foot_paths,
     own_paths,
 )
 from .foot_lock import Footing, GroundHeight, locking_feet, steps_of
@@ -41,9 +43,10 @@ from .leg_travel import (
     body_path,
     check_hips,
     heading,
+    leg_length,
     write_hips,
 )
-from .loop_rounds import Rounds, is_loop
+from .loop_rounds import Rounds, is_loop, own_round
 from .parts import LEG, PARTS
 from .rehung import Rehung, whole_limbs
 from .retarget import (
@@ -69,6 +72,9 @@ _UPRIGHT: Final = 0.85
 
 _FOLLOWED: Final = 0.2
 """Seconds over which the body follows the ground, a third of it to either side."""
+
+_LEVEL_LOOP: Final = 0.01
+"""Leg lengths that ground rises at most from a loop's first frame to its last."""
 
 _LEVEL: Final = np.array([1.0, 1.0, 0.0])
 
@@ -181,6 +187,21 @@ class _Pair:
     hung: Rehung | None
     rests: Reresting | None
 
+    @cached_property
+    def paths(self) -> FootPaths:
+        """Where the clip's feet are."""
+        return own_paths(self.source)
+
+    @cached_property
+    def balls(self) -> Floats:
+        """Where the balls of the body's feet are; see :func:`answering_balls`."""
+        return answering_balls(self.retargets[:2], "LR")
+
+    @cached_property
+    def stance(self) -> Stance:
+        """How the body stands."""
+        return find_stance(own_paths(self.stands, self.balls))
+
     def moving(
         self, settings: WholeBody, rows: np.ndarray | None = None
     ) -> Generator[None, None, Clip]:
@@ -275,13 +296,10 @@ class _Mover:
         frames = source.clip.frames
         self._frames = frames if rows is None else frames[rows]
         self._moment = sample_clip(source.clip, self._frames)
-        whole = self._moment if rows is None else sample_clip(source.clip, frames)
-        self._paths = foot_paths(source, whole, frames)
-        self._balls = answering_balls(retargets[:2], "LR")
-        self._stands = find_stance(own_paths(pair.stands, self._balls))
+        self._paths, self._balls, self._stands = pair.paths, pair.balls, pair.stance
         if settings.ground is not None:
             self._stands = above_soles(self._stands, base)
-        self._width = max(1, round(_FOLLOWED * self._paths.rate))
+        self._width = max(1, round(_FOLLOWED * source.clip.rate))
         check_hips(base.skeleton, retargets[0].frames[0].bone)
 
     def onto(self, before: Clip) -> Generator[None, None, Clip]:
@@ -336,8 +354,13 @@ class _Mover:
 
     def _standing(self, result: Clip) -> Generator[None, None, Clip]:
         """With feet that stand, in steps."""
-        paths = self._paths
+        paths, ground = self._paths, self._settings.ground
         loops = is_loop(self._source, paths)
+        if loops and ground is not None:
+            # Uphill no round is like the one before.
+            _, heads = result.taken([0, -1]).posed()
+            rise = np.ptp(ground.height(heads[:, self._base.bone("hips")]))
+            loops = bool(rise < _LEVEL_LOOP * leg_length(self._base) * result.scale)
         if loops:
             paths = replace(paths, points=Rounds.between(paths.hips).points(paths.points))
         contacts = find_contacts(paths)
@@ -345,10 +368,17 @@ class _Mover:
         steps = steps_of(paths, contacts, find_stance(paths), self._ratio)
         yield
         if self._rows is not None:
-            own = self._rows + (len(self._source.clip) - 1 if loops else 0)
+            own = own_round(len(paths.moments)) if loops else slice(None)
             contacts, steps, loops = FootContacts(contacts.held[own]), steps[own], False
         footing = Footing(
-            contacts, self._stands, steps, self._settings.ground, self._balls, cyclic=loops
+            contacts,
+            paths.moments,
+            self._stands,
+            steps,
+            self._frames,
+            ground,
+            self._balls,
+            cyclic=loops,
         )
         return (yield from locking_feet(self._base, result, footing))
 
