@@ -25,6 +25,7 @@ from ...rotations import (
     to_rotation_vector,
 )
 from ...skeleton import Skeleton
+from ...steps import finished
 
 MOTION_SUFFIXES: Final = (".bvh", ".fbx", ".glb", ".gltf")
 """Endings of the files from which clips may come."""
@@ -258,6 +259,15 @@ def clip_at(clip: Clip, frames: Floats) -> Generator[None, None, Clip]:
         scales=None if clip.scales is None else mixed(clip.scales),
         own=None if clip.own is None else mixed(clip.own),
     )
+
+
+def spread_clip(clip: Clip, count: int) -> Clip:
+    """A clip at so many moments evenly over its time: what is told from them is the same at any
+    frame rate. Itself if it has but one frame.
+    """
+    if len(clip) < 2:
+        return clip
+    return finished(clip_at(clip, np.linspace(clip.frames[0], clip.frames[-1], count)))
 
 
 def sample_world(clip: Clip, frames: Floats) -> tuple[Floats, Floats, float]:

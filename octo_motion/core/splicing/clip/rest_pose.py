@@ -10,7 +10,7 @@ import numpy as np
 
 from ...rotations import IDENTITY, Floats, conjugate, multiply, normalized, rotate, to_matrix
 from ...skeleton import Skeleton
-from .clip import Clip
+from .clip import Clip, spread_clip
 
 _NEAR: Final = 0.05
 """Radians (and of a unit vector): what lies nearer to the robust mean weighs no more than this."""
@@ -22,7 +22,7 @@ _ROUNDS: Final = 12
 """Of reweighting: means move by less than 1e-4 afterwards."""
 
 _LOOKS: Final = 100
-"""Frames of a clip from which its average pose is found."""
+"""Moments of a clip from which its average pose is found."""
 
 
 def with_rest_pose(
@@ -58,22 +58,22 @@ def usual_offsets(clip: Clip) -> Floats:
     """
     skeleton = clip.skeleton
     offsets = rest_offsets(skeleton)
-    rows = _looks(clip)
+    looks = spread_clip(clip, _LOOKS)
     moved = [
         bone
-        for bone in np.flatnonzero(clip.locations[rows].any(axis=(0, 2))).tolist()
+        for bone in np.flatnonzero(looks.locations.any(axis=(0, 2))).tolist()
         if skeleton.parents[bone] >= 0
     ]
     if not moved:
         return offsets
-    turns, heads = skeleton.pose(clip.rotations[rows], clip.locations[rows])
+    turns, heads = skeleton.pose(looks.rotations, looks.locations)
     parents = [skeleton.parents[bone] for bone in moved]
     places = rotate(conjugate(turns[:, parents]), heads[:, moved] - heads[:, parents])
-    offsets[moved] = _robust_places(places)
+    offsets[moved] = robust_places(places)
     return offsets
 
 
-def _robust_places(places: Floats) -> Floats:
+def robust_places(places: Floats) -> Floats:
     """Geometric medians (bones, 3) of places (moments, bones, 3), after Weiszfeld."""
     mean = places.mean(axis=0)
     near = np.linalg.norm(places - mean, axis=-1).max(axis=0) * _NEAR + 1e-12
@@ -83,17 +83,12 @@ def _robust_places(places: Floats) -> Floats:
     return mean
 
 
-def _looks(clip: Clip) -> np.ndarray:
-    """Rows of a clip from which one sees how it is on average."""
-    return np.linspace(0, len(clip) - 1, min(len(clip), _LOOKS)).astype(np.intp)
-
-
 def average_pose(clip: Clip) -> Skeleton:
     """A clip's skeleton resting as its bones lie on average: whatever its rest pose is, that is a
     pose of its body.
     """
     skeleton = clip.skeleton
-    turns, _ = skeleton.pose(clip.rotations[_looks(clip)])
+    turns, _ = skeleton.pose(spread_clip(clip, _LOOKS).rotations)
     parents = np.array(skeleton.parents)
     between = multiply(conjugate(turns[:, np.maximum(parents, 0)]), turns)
     between[:, parents < 0] = turns[:, parents < 0]

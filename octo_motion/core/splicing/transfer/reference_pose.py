@@ -35,12 +35,12 @@ from ...rotations import (
     shortest_arc,
 )
 from ...smoothing import smooth_step
-from ..clip import Clip, robust_direction, robust_rotations, usual_offsets
+from ..clip import Clip, robust_direction, robust_rotations, spread_clip, usual_offsets
 from ..humanoid import Landmarks, palm_directions, palm_roots
 from .reference_feet import FootMoments, feet_at_rest
 
 _SAMPLES: Final = 240
-"""Frames of a clip that are looked at."""
+"""Moments of a clip that are looked at."""
 
 _STANDING: Final = (0.75, 0.92)
 """Of the length of legs and trunk: how far the neck is from the feet when nobody stands, and from
@@ -200,10 +200,9 @@ class ReferenceFinder:
 
     def __init__(self, clip: Clip, landmarks: Landmarks) -> None:
         self._skeleton = clip.skeleton
-        count = min(len(clip), _SAMPLES)
-        rows = np.linspace(0, len(clip) - 1, count).astype(np.intp)
-        self._turns, self._heads = clip.skeleton.pose(clip.rotations[rows], clip.locations[rows])
-        world = clip.world[rows, :3] / clip.scale
+        looks = spread_clip(clip, _SAMPLES)
+        self._turns, self._heads = clip.skeleton.pose(looks.rotations, looks.locations)
+        world = looks.world[:, :3] / clip.scale
         self._world = from_matrix(world[..., :3]), world[..., 3]
         index = clip.skeleton.index
         self._bones = {name: index[bone] for name, bone in landmarks.bones.items() if bone in index}

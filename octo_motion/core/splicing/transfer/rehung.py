@@ -15,7 +15,7 @@ import numpy as np
 
 from ...rotations import Floats, conjugate, multiply, rotate
 from ...skeleton import Skeleton
-from ..clip import Clip, Posture, posture_of
+from ..clip import Clip, Posture, posture_of, spread_clip
 from ..humanoid import Landmarks
 from .parts import ARM, LEG
 from .retarget import MappedClip
@@ -25,7 +25,7 @@ _RIGID: Final = 0.08
 begins."""
 
 _SAMPLES: Final = 100
-"""Frames of a clip that are looked at."""
+"""Moments of a clip that are looked at."""
 
 _ENDS: Final = {"hand": "forearm", "foot": "shin"}
 
@@ -148,8 +148,8 @@ def find_rehung(clip: Clip, landmarks: Landmarks | None) -> Rehung | None:
 
 def _ends_at(clip: Clip, upper: int, lower: int) -> bool:
     """Whether one bone is always as far from the other as a bone is long."""
-    rows = np.linspace(0, len(clip) - 1, min(len(clip), _SAMPLES)).astype(np.intp)
-    posture = posture_of(clip.skeleton, clip.rotations[rows], clip.locations[rows])
+    looks = spread_clip(clip, _SAMPLES)
+    posture = posture_of(clip.skeleton, looks.rotations, looks.locations)
     between = rotate(
         conjugate(posture.orientation(upper)), posture.head(lower) - posture.head(upper)
     )

@@ -65,7 +65,7 @@ from .same_body import agreeing
 from .upright import Body, body_of, facing, stand_over
 
 _HINGE_SAMPLES = 200
-"""Frames of a clip from which a limb's hinge is read."""
+"""Moments of a clip from which a limb's hinge is read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,7 +273,7 @@ class Retarget:
         assert self.limb is not None
         (joint, _, _), others = self.limb
         clip = self.splice.clip
-        chosen = np.linspace(clip.frames[0], clip.frames[-1], min(len(clip), _HINGE_SAMPLES))
+        chosen = np.linspace(clip.frames[0], clip.frames[-1], _HINGE_SAMPLES)
         posture = sample_clip(clip, chosen)
         limb = LimbTriangle(*(posture.head(bone) for bone in others))
         axis = hinge_axis(limb, posture.orientation(others[0]))

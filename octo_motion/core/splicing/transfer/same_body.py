@@ -34,7 +34,7 @@ from ...rotations import (
     to_matrix,
 )
 from ...skeleton import Skeleton
-from ..clip import Clip, usual_offsets
+from ..clip import Clip, spread_clip, usual_offsets
 from ..humanoid import Landmarks, matched_bones
 
 _LOOKS: Final = 120
@@ -86,8 +86,8 @@ class _Moments:
 
     @classmethod
     def of(cls, clip: Clip) -> _Moments:
-        rows = np.linspace(0, len(clip) - 1, min(len(clip), _LOOKS)).astype(np.intp)
-        turns, heads = clip.skeleton.pose(clip.rotations[rows], clip.locations[rows])
+        looks = spread_clip(clip, _LOOKS)
+        turns, heads = clip.skeleton.pose(looks.rotations, looks.locations)
         return cls(clip.skeleton, turns, heads, usual_offsets(clip))
 
     def seen(self, anchor: int, bone: int, child: int) -> Floats:

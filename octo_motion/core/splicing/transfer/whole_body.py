@@ -2,9 +2,9 @@
 """A whole clip carried over to another body: all parts, the way through the world, feet that stand.
 
 The parts are those of splicing, one after the other onto a body that does nothing: legs with the
-pelvis's way, trunk, arms, head. What no part takes rests. Each frame hangs on the clip's own alone,
-but for feet that stand, whose frames before and behind have a say: of a loop those are the rounds
-before and behind, so that it stays one.
+pelvis's way, trunk, arms, head. What no part takes is as usual in a motion of that body. Each frame
+hangs on the clip's own alone, but for feet that stand, whose frames before and behind have a say:
+of a loop those are the rounds before and behind, so that it stays one.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from typing import Final
 import numpy as np
 
 from ...rotations import (
-    IDENTITY,
     Floats,
     from_matrix,
     multiply,
@@ -27,7 +26,15 @@ from ...rotations import (
 from ...skeleton import Skeleton
 from ...smoothing import blurred
 from ...steps import finished
-from ..clip import Clip, Reresting, posture_of, sample_clip
+from ..clip import (
+    Clip,
+    Reresting,
+    posture_of,
+    robust_places,
+    robust_rotations,
+    sample_clip,
+    spread_clip,
+)
 from ..humanoid import Landmarks, chain_length
 from .foot_contacts import (
     FootContacts,
@@ -69,6 +76,9 @@ _STRAIGHT: Final = 0.85
 """Of its bones: how long a leg is from hip to ankle at least when somebody stands."""
 _UPRIGHT: Final = 0.85
 """Cosine of how far legs are off the trunk then, and the shoulders off the hips."""
+
+_LOOKS: Final = 100
+"""Moments of a body's own motion at which one sees how it holds what no part takes."""
 
 _FOLLOWED: Final = 0.2
 """Seconds over which the body follows the ground, a third of it to either side."""
@@ -122,7 +132,8 @@ def retargeting_clip(
             has; it says where its object stands, and at what frames the result is.
         source: the clip.
         settings: how, as usual if not given.
-        standing: a clip of that body that tells at which height it stands; the base if not given.
+        standing: a clip of that body that tells at which height it stands, and how it holds what
+            no part takes; the base if not given.
 
     Raises:
         ClipError: a landmark is missing, or the hips cannot leave their parent.
@@ -180,10 +191,8 @@ class _Pair:
     """The body as it is, that does nothing, …"""
     joined: Clip
     """… with its limbs whole, …"""
-    at_rest: Clip
-    """… with its reference pose as its rest pose, …"""
     before: Clip
-    """… and with what carries its limbs in place."""
+    """… and with its reference pose as its rest pose."""
     hung: Rehung | None
     rests: Reresting | None
 
@@ -214,7 +223,7 @@ class _Pair:
         yield
         result = yield from mover.onto(some(self.before))
         if self.rests is not None:
-            result = self.rests.back(result, some(self.at_rest), some(self.joined))
+            result = self.rests.back(result, some(self.before), some(self.joined))
             yield
         if self.hung is not None:
             result = self.hung.back(result, some(self.joined), some(self.still))
@@ -225,6 +234,7 @@ def _pairing(
     base: MappedClip, still: Clip, source: MappedClip, standing: MappedClip | None
 ) -> Generator[None, None, _Pair]:
     assert len(still) == len(source.clip)
+    still = _held_as_usual(still, base if standing is None else standing)
     whole, hung = whole_limbs(base)
     source, _ = whole_limbs(source)
     joined = still if hung is None else hung.into(still)
@@ -232,16 +242,14 @@ def _pairing(
     yield
     ours, theirs = compared(whole, source)
     rests = ours.rests if isinstance(ours, ReferredClip) else None
-    at_rest = before = joined if rests is None else rests.into(joined)
+    before = joined if rests is None else rests.into(joined)
     yield
     retargets: list[Retarget] = []
     for name in _PARTS:
         seen_from = "pelvis" if name == "legs" else ""
         retargets += find_retargets(PARTS[name], ours, theirs, clavicle=True, seen_from=seen_from)
         yield
-    if rests is not None and not rests_standing(whole.skeleton, whole.landmarks):
-        before = _with_carriers_in_place(before, ours, retargets)
-    return _Pair(ours, theirs, retargets, stands, still, joined, at_rest, before, hung, rests)
+    return _Pair(ours, theirs, retargets, stands, still, joined, before, hung, rests)
 
 
 def rests_standing(skeleton: Skeleton, landmarks: Landmarks | None) -> bool:
@@ -268,19 +276,21 @@ def rests_standing(skeleton: Skeleton, landmarks: Landmarks | None) -> bool:
     return True
 
 
-def _with_carriers_in_place(still: Clip, body: MappedClip, retargets: list[Retarget]) -> Clip:
-    """A body that does nothing, with bones that carry limbs and that no part takes as they are in
-    the reference pose: where a file's rest pose is none of a body, they would put limbs anywhere.
+def _held_as_usual(still: Clip, own: MappedClip) -> Clip:
+    """A body that does nothing, with bones on their parents as they usually are in a motion of its
+    own: fingers round a grip, hair, what carries limbs. That is what becomes of those that no part
+    takes, whatever its file's rest pose is. What carries the hips stays where it rests, turned as
+    that motion begins.
     """
-    skeleton, marks = still.skeleton, body.humanoid()
-    hips = body.bone("hips")
-    taken = {bone for each in retargets for bone in each.bones}
-    ends = [bone for name in marks.bones if (bone := skeleton.index.get(marks[name])) is not None]
-    carriers = {bone for end in ends for bone in skeleton.ancestors(end)}
-    carriers = {bone for bone in carriers - taken if hips in skeleton.ancestors(bone)}
-    rotations = still.rotations.copy()
-    rotations[:, sorted(carriers)] = IDENTITY
-    return replace(still, rotations=rotations)
+    skeleton, looks = still.skeleton, spread_clip(own.clip, _LOOKS)
+    hips = own.bone("hips")
+    above = skeleton.ancestors(hips)
+    bones = [bone for bone in range(len(skeleton)) if bone not in (hips, *above)]
+    rotations, locations = still.rotations.copy(), still.locations.copy()
+    rotations[:, above] = looks.rotations[0, above]
+    rotations[:, bones] = robust_rotations(looks.rotations[:, bones], np.ones((len(looks), 1)))
+    locations[:, bones] = robust_places(looks.locations[:, bones])
+    return replace(still, rotations=rotations, locations=locations)
 
 
 class _Mover:
