@@ -262,12 +262,13 @@ def clip_at(clip: Clip, frames: Floats) -> Generator[None, None, Clip]:
 
 
 def spread_clip(clip: Clip, count: int) -> Clip:
-    """A clip at so many moments evenly over its time: what is told from them is the same at any
-    frame rate. Itself if it has but one frame.
+    """Poses of a clip at so many moments evenly over its time: what is told from them is the same
+    at any frame rate. Itself if it has but one frame.
     """
     if len(clip) < 2:
         return clip
-    return finished(clip_at(clip, np.linspace(clip.frames[0], clip.frames[-1], count)))
+    poses = replace(clip, scales=None, own=None)
+    return finished(clip_at(poses, np.linspace(clip.frames[0], clip.frames[-1], count)))
 
 
 def sample_world(clip: Clip, frames: Floats) -> tuple[Floats, Floats, float]:
