@@ -69,6 +69,10 @@ def test_feet_stand_where_their_clip_stands_and_on_the_ground(name: str) -> None
     assert OPERATORS.retarget() == {"FINISHED"}
     body, recording = BODIES[name], played(hero)
     assert drifts(recording, body) < 0.005
+    # A loop that climbs goes on where it ends: no round sinks to the height of the one before.
+    hips = joint(recording, "hips")
+    above = hips[:, 2] + 0.15 * hips[:, 1]
+    assert np.ptp(above) < 0.25 * body.leg
     for side in "LR":
         ankle = joint(recording, f"foot.{side}")
         for rows in holds(recording.frames, side, ball=False):
@@ -208,11 +212,16 @@ def test_a_body_goes_from_where_its_armature_stands_and_faces() -> None:
     assert way[0] > 0.9 * np.linalg.norm(way)
 
 
-def slope() -> Any:
-    """A mesh that rises the way the walkers go."""
-    points = [(x, y, -0.15 * y) for x in (-3.0, 3.0) for y in (-6.0, 3.0)]
+def slope(start: float = 3.0) -> Any:
+    """A mesh that rises the way the walkers go, from a place on."""
+    rows = [-6.0, start] if start >= 3.0 else [-6.0, start, 3.0]
+    points = [(x, y, -0.15 * min(y - start, 0.0)) for y in rows for x in (-3.0, 3.0)]
+    if start >= 3.0:
+        points = [(x, y, z - 0.45) for x, y, z in points]
     mesh = bpy.data.meshes.new("Slope")
-    mesh.from_pydata(points, [], [(0, 1, 3, 2)])
+    mesh.from_pydata(
+        points, [], [(2 * n, 2 * n + 1, 2 * n + 3, 2 * n + 2) for n in range(len(rows) - 1)]
+    )
     ground = bpy.data.objects.new("Slope", mesh)
     bpy.context.scene.collection.objects.link(ground)
     return ground
@@ -221,6 +230,10 @@ def slope() -> Any:
 def assert_standing_on_the_slope(hero: Any, body: Body) -> None:
     recording = played(hero)
     assert drifts(recording, body) < 0.005
+    # A loop that climbs goes on where it ends: no round sinks to the height of the one before.
+    hips = joint(recording, "hips")
+    above = hips[:, 2] + 0.15 * hips[:, 1]
+    assert np.ptp(above) < 0.25 * body.leg
     for side in "LR":
         ankle = joint(recording, f"foot.{side}")
         for rows in holds(recording.frames, side, ball=False):
@@ -234,6 +247,22 @@ def test_feet_stand_on_a_mesh() -> None:
     hero.octo_motion.splicing.retarget.ground = slope()
     OPERATORS.retarget()
     assert_standing_on_the_slope(hero, body)
+
+
+def test_feet_are_tilted_as_the_ground_is_beneath_them() -> None:
+    _, hero = walker_and("like it")
+    body, start = BODIES["like it"], -0.5
+    hero.octo_motion.splicing.retarget.ground = slope(start)
+    OPERATORS.retarget()
+    recording = played(hero)
+    up = np.array([0.0, 0.15, 1.0]) / np.hypot(0.15, 1.0)
+    for side in "LR":
+        ankle, ball = (joint(recording, f"{each}.{side}") for each in ("foot", "toe"))
+        for rows in holds(recording.frames, side, ball=False):
+            normal = up if ball[rows, 1].max() < start - 0.1 else np.array([0.0, 0.0, 1.0])
+            if normal is up or ball[rows, 1].min() > start + 0.3:
+                rise = (ball[rows] - ankle[rows]) @ normal
+                assert np.abs(rise - (0.02 - body.ankle)).max() < 0.01
 
 
 def test_feet_of_a_splice_stand_on_a_mesh() -> None:

@@ -234,6 +234,9 @@ def _pairing(
     base: MappedClip, still: Clip, source: MappedClip, standing: MappedClip | None
 ) -> Generator[None, None, _Pair]:
     assert len(still) == len(source.clip)
+    if standing is not None and standing is not base:
+        # Where joints are a body's motion says: a file may rest with them elsewhere.
+        base = MappedClip(_held_as_usual(base.clip, standing, turned=False), base.landmarks)
     still = _held_as_usual(still, base if standing is None else standing)
     whole, hung = whole_limbs(base)
     source, _ = whole_limbs(source)
@@ -276,19 +279,20 @@ def rests_standing(skeleton: Skeleton, landmarks: Landmarks | None) -> bool:
     return True
 
 
-def _held_as_usual(still: Clip, own: MappedClip) -> Clip:
+def _held_as_usual(still: Clip, own: MappedClip, *, turned: bool = True) -> Clip:
     """A body that does nothing, with bones on their parents as they usually are in a motion of its
     own: fingers round a grip, hair, what carries limbs. That is what becomes of those that no part
     takes, whatever its file's rest pose is. What carries the hips stays where it rests, turned as
-    that motion begins.
+    that motion begins. If not ``turned`` all bones keep their rotations.
     """
     skeleton, looks = still.skeleton, spread_clip(own.clip, _LOOKS)
     hips = own.bone("hips")
     above = skeleton.ancestors(hips)
     bones = [bone for bone in range(len(skeleton)) if bone not in (hips, *above)]
     rotations, locations = still.rotations.copy(), still.locations.copy()
-    rotations[:, above] = looks.rotations[0, above]
-    rotations[:, bones] = robust_rotations(looks.rotations[:, bones], np.ones((len(looks), 1)))
+    if turned:
+        rotations[:, above] = looks.rotations[0, above]
+        rotations[:, bones] = robust_rotations(looks.rotations[:, bones], np.ones((len(looks), 1)))
     locations[:, bones] = robust_places(looks.locations[:, bones])
     return replace(still, rotations=rotations, locations=locations)
 
