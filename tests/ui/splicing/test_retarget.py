@@ -69,10 +69,6 @@ def test_feet_stand_where_their_clip_stands_and_on_the_ground(name: str) -> None
     assert OPERATORS.retarget() == {"FINISHED"}
     body, recording = BODIES[name], played(hero)
     assert drifts(recording, body) < 0.005
-    # A loop that climbs goes on where it ends: no round sinks to the height of the one before.
-    hips = joint(recording, "hips")
-    above = hips[:, 2] + 0.15 * hips[:, 1]
-    assert np.ptp(above) < 0.25 * body.leg
     for side in "LR":
         ankle = joint(recording, f"foot.{side}")
         for rows in holds(recording.frames, side, ball=False):
