@@ -120,7 +120,8 @@ class ControlledPuppet(Puppet):
             self._go_on(self._goal)
             return known.told
         goal = self._points.of(self._goal)
-        wanted = self._turned()
+        turned = self._turned()
+        wanted = set(turned)
         if wanted:
             self._aim(goal)
         off = self._misses(goal)
@@ -131,7 +132,7 @@ class ControlledPuppet(Puppet):
             self._take(self._wide(wanted), placed=True, anew=True)
             wanted |= set(np.flatnonzero(off > _TOLD).tolist())
             if self._fit is not None:
-                self._fit.settle(goal, self._points.hard, _CLOSE, _TOLD)
+                self._fit.settle(goal, self._points.hard, _CLOSE, _TOLD, self._own(turned))
             off = self._misses(goal)
         told, body = "", int(np.argmax(off))
         if off[body] > _TOLD:
@@ -273,6 +274,14 @@ class ControlledPuppet(Puppet):
     def _turned(self) -> set[int]:
         """Bodies that are turned against what they hang on since the bones were read."""
         return set(turned_bodies(self.figure, self._base, self._goal))
+
+    def _own(self, turned: set[int]) -> list[int]:
+        """Which of the controls that are moved begin at limbs that were bent."""
+        return [
+            number
+            for number, each in enumerate(self._moving)
+            if min(self._limbs[each.name], default=-1) in turned
+        ]
 
     def _misses(self, goal: Floats) -> Floats:
         """(bodies,) how far each limb is from where it is wanted, in sizes of the figure."""

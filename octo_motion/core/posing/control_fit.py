@@ -31,6 +31,8 @@ _SLOW: Final = 0.5
 """Share of the miss: a step that leaves more of it asks for new derivatives."""
 _ENOUGH: Final = 0.95
 """Share of the miss: with new derivatives, what leaves more of it is not worth its while."""
+_SAME: Final = 1e-4
+"""Of the largest, what counts as no derivative: as near as differences tell."""
 _STAYS: Final = 3e-4
 """What a value of one counts against what is off: what hardly matters stays where it is."""
 _NO_WAY: Final = 1e-16
@@ -80,11 +82,14 @@ class ControlFit:
             self._choose(goal)
         return self._step(goal)
 
-    def settle(self, goal: Floats, hard: int, close: float, enough: float) -> float:
+    def settle(
+        self, goal: Floats, hard: int, close: float, enough: float, own: Sequence[int] = ()
+    ) -> float:
         """Go on until the first ``hard`` numbers, three to a point, are close, or come no closer.
 
-        Where they are close enough, no other controls are moved for it. Returns how far the
-        farthest point is off in the end.
+        Where they are close enough, no other controls are moved for it. Where few controls do not
+        reach, these ``own`` ones of what was bent are moved as well, if that does it. Returns how
+        far the farthest point is off in the end.
         """
         for _ in range(_ROUNDS if len(self.values) else 0):
             if self.off(goal, hard) <= close:
@@ -106,7 +111,9 @@ class ControlFit:
                 if self._missed(goal) > _SLOW * start and not fresh:
                     self._ask(self._chosen)
                     fresh = True
-            if self._missed(goal) > _ENOUGH * before:
+            if self._missed(goal) > _ENOUGH * before and (
+                self.off(goal, hard) <= enough or not self._reach(goal, own)
+            ):
                 break
         return self.off(goal, hard)
 
@@ -150,15 +157,30 @@ class ControlFit:
 
     def _choose(self, goal: Floats) -> None:
         """Take controls beside those that are moved, as long as one takes away enough."""
+        self._take(goal, self._blocks, _GAIN)
+
+    def _reach(self, goal: Floats, own: Sequence[int]) -> bool:
+        """Take more of some controls, each of which does little, where together they do most."""
+        assert self._slopes is not None
+        more = [self._blocks[each] for each in own if self._blocks[each][0] not in self._chosen]
+        slopes, miss = self._slopes[:, sum(more, self._chosen)], self.now - goal
+        # Undamped: of controls that do nearly alike, it is the differences that bend a chain.
+        way = np.linalg.lstsq(slopes, miss, rcond=_SAME)[0]
+        if not more or _square(miss - slopes @ way) > _REST * _square(miss):
+            return False
+        self._take(goal, more, 0.0)
+        return True
+
+    def _take(self, goal: Floats, blocks: Sequence[list[int]], gain: float) -> None:
         assert self._slopes is not None
         slopes, miss = self._slopes, self.now - goal
         left = _left(slopes[:, self._chosen], miss)
-        waiting = [each for each in self._blocks if not set(each) & set(self._chosen)]
+        waiting = [each for each in blocks if not set(each) & set(self._chosen)]
         start = _square(left)
         while waiting and _square(left) > _REST * start:
             gains = [_square(left) - _square(_left(slopes[:, each], left)) for each in waiting]
             best = int(np.argmax(gains))
-            if gains[best] <= _GAIN * start:
+            if gains[best] <= gain * start:
                 break
             self._chosen = self._chosen + waiting.pop(best)
             left = _left(slopes[:, self._chosen], miss)

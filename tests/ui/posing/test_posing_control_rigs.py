@@ -208,6 +208,48 @@ def test_what_the_controls_cannot_reach_is_said() -> None:
     session.cancel()
 
 
+def tentacle() -> Any:
+    """Six limbs in a row; each control bends along with the one before, as Rigify's do."""
+    limbs: dict[str, Any] = {"trunk": ("", (0, 0, 0), (0, 0, 0.3))}
+    for prefix in ("control", "DEF-"):
+        for number in range(6):
+            above = f"{prefix}{number - 1}" if number else "trunk"
+            start = 0.1 + 0.2 * number
+            limbs[f"{prefix}{number}"] = (above, (start, 0, 0), (start + 0.2, 0, 0))
+    armature = rig(**limbs)
+    local = {"owner_space": "LOCAL", "target_space": "LOCAL", "mix_mode": "BEFORE"}
+    for number in range(6):
+        armature.data.bones[f"control{number}"].use_deform = False
+        constrain(armature, f"DEF-{number}", "COPY_TRANSFORMS", f"control{number}")
+        if number:
+            above = f"control{number - 1}"
+            bend = {"use_x": True, "use_y": False, "use_z": False}
+            constrain(armature, f"control{number}", "COPY_ROTATION", above, **local, **bend)
+    return armature
+
+
+@pytest.mark.parametrize(
+    "by", [(-0.2, 0.25, 0.2), (0.0, 0.3, 0.3), (-0.2, -0.3, 0.1), (-0.4, 0.3, -0.1)]
+)
+def test_controls_that_each_do_little_are_moved_where_few_do_not_reach(
+    by: tuple[float, float, float],
+) -> None:
+    """Measured 0.03 to 0.46 mm on a body of 1.7 m; with few controls it was 1.8 to 6.7."""
+    armature = tentacle()
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    start = session.grab_bone("DEF-5", 1.0)
+    for number in range(1, 61):
+        session.tick(TICK, start + min(number / 40.0, 1.0) * np.array(by))
+    names, pose = session.figure.names, session.core.pose.positions / session.unit
+    session.release()
+    told, size = session.missed, session.size
+    bpy.context.view_layer.update()
+    shown = np.array([armature.matrix_world @ armature.pose.bones[name].head for name in names])
+    session.finish()
+    assert not told
+    assert np.linalg.norm(shown - pose, axis=1).max() < MILLIMETRE * size / 1.7
+
+
 def test_escape_gives_the_controls_back() -> None:
     armature = by_goal_and_pole()
     before = [np.array(each.matrix_basis) for each in armature.pose.bones]
