@@ -5,7 +5,8 @@ What lies between controls and bones (inverse kinematics, constraints, drivers) 
 only asked: damped least squares after Levenberg and Marquardt, with derivatives by differences that
 Broyden's rule (1965) keeps up to date, so that most steps ask but once. An artist moves few
 controls, and so do we: one after the other those are taken that do most, by orthogonal matching
-pursuit (Pati and others 1993), and the others stay.
+pursuit (Pati and others 1993), and the others stay. Where these do not reach, as in a chain whose
+controls each bend along with the one before, the controls of what was bent are moved together.
 """
 
 from __future__ import annotations
