@@ -260,12 +260,18 @@ def afloat(swims: Sequence[bool], shares: Sequence[Floats]) -> Floats:
 
 
 def keep_off_ground(
-    course: ArmsOverGround, poses: Poses, radii: Sequence[Floats], loose: Floats
+    course: ArmsOverGround,
+    poses: Poses,
+    radii: Sequence[Floats],
+    loose: Floats,
+    *,
+    closer: float = 0.0,
 ) -> Floats:
     """Rotations (frames, bones, 4) of the same arms off the ground.
 
     Radii are metres from each joint (joints,) of an arm to the skin below it, or for all frames
-    (frames, joints); ``loose`` (frames, arms) is how far each is to be raised, 0…1.
+    (frames, joints); ``loose`` (frames, arms) is how far each is to be raised, 0…1. They may come
+    ``closer`` than arms keep off elsewhere, by so many arm lengths.
     """
     result = poses.rotations.copy()
     for number, arm in enumerate(course.arms):
@@ -279,7 +285,7 @@ def keep_off_ground(
         roots = poses.locations[chosen] + rotate(facing[:, 0], course.scale * arm.root)
         reach = np.concatenate([np.zeros((len(chosen), 1)), np.cumsum(lengths, axis=1)], axis=1)
         below = np.broadcast_to(radii[number], (len(loose), reach.shape[1]))[chosen]
-        needed = room_needed(below, reach[:, -1:])
+        needed = room_needed(below, reach[:, -1:], -closer * reach[:, -1:])
         own = loose_from_root(reach, reach[:, -1:]) * loose[chosen, number, None]
         room = JointRoom(
             np.ascontiguousarray(needed.T),

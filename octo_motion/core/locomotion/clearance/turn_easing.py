@@ -127,11 +127,11 @@ def where_it_helps(
     every: int = 1,
 ) -> Floats:
     """Rotations (moments, bones, 4), eased from what they were before; as before wherever an arm
-    still turns by nearly as much more than the most radians as it did. Arguments are as of
-    :func:`eased_turns`.
+    did not turn by more than the most radians, and where it still does by nearly as much more.
+    Arguments are as of :func:`eased_turns`.
 
     Each stretch of an arm counts by itself: what cannot be helped at one place of a long way
-    spoils nothing at another.
+    spoils nothing at another, and what is too fast in a hold changes nothing before and after it.
     """
     then, now = (turns_in_world(arms, each, orientations, every) for each in (before, eased))
     result, start = eased.copy(), 0
@@ -141,7 +141,7 @@ def where_it_helps(
         for first, end in spans((before[:, own] != eased[:, own]).any(axis=(1, 2))):
             part = slice(max(first - every, 0), end)
             was, left = (each[part, own].max(initial=0.0) - most for each in (then, now))
-            if left > max(_HELPED * was, 0.0):
+            if left > _HELPED * was or was <= 0.0:
                 result[first:end, own] = before[first:end, own]
     return result
 

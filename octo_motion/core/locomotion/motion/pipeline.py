@@ -33,7 +33,14 @@ from ..ground import Ground, sample_ground
 from ..metrics import TOLD, Figure, Measured, finding_figures
 from ..path import Travel, bearings_of, plan_travel, travel_at
 from ..reaching import Carried, Reached, Travelling
-from ..rig import ArmMotion, Poses, halfway_automatic, object_transforms, root_bone_transforms
+from ..rig import (
+    MARGIN,
+    ArmMotion,
+    Poses,
+    halfway_automatic,
+    object_transforms,
+    root_bone_transforms,
+)
 from .carrying import Carry, carried
 from .few_keys import Motion, measuring_keyed, reduced
 from .handover import (
@@ -109,6 +116,8 @@ _BONES_AT_ONCE: Final = 50_000
 """Bones times frames of one step of the work: some tens of megabytes."""
 _KEPT: Final = 2**25 - 2**16
 """Bytes of the largest arrays whose memory is kept: glibc keeps that of none beyond 2**25."""
+_EASINGS: Final = 4
+"""How often bones that turn too fast are given more time, and kept off the ground again."""
 _TURNS: Final = 8
 """Of one step where Blender goes on meanwhile; the numbers are the same."""
 _FLOOR_AROUND: Final = 2.5
@@ -654,7 +663,7 @@ def _take_time(
 ) -> None:
     """Let bones that would turn too fast for an eye take their time, off the ground."""
     job, every = plan.job, plan.stride
-    creature, ground = job.creature, _underfoot(plan)
+    creature = job.creature
     busy = reached.away > 0.0 if reached is not None else np.zeros(arms.late.shape, dtype=bool)
     held = [
         (lying.any(axis=1) & (late <= MISS)) | own
@@ -662,7 +671,7 @@ def _take_time(
     ]
     frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
     before, rate, per_cycle = arms.rotations, job.timing.rate, plan.pace.fastest
-    for last in (False, False, True):
+    for number in range(_EASINGS):
         eased = eased_turns(
             *(frames, arms.rotations, going[1], held),
             rate=rate,
@@ -673,11 +682,15 @@ def _take_time(
         if eased is None:
             break
         arms.rotations, changed = eased
-        if ground is not None and not last:
+        # What comes of that is jerked as little as can be: out of the ground itself, and no more.
+        last = number == _EASINGS - 1
+        ground = _ground(plan) if last else _underfoot(plan)
+        if ground is not None:
             course = ArmsOverGround(frames, ground, creature.scale, cyclic=cyclic)
             poses = Poses(arms.rotations, arms.strains, *going)
             radii = [creature.scale * each for each in plan.standing[0].radii]
-            arms.rotations = keep_off_ground(course, poses, radii, changed)
+            closer = MARGIN if last else 0.0
+            arms.rotations = keep_off_ground(course, poses, radii, changed, closer=closer)
     if arms.rotations is before:
         return
     # Where it is no help, it is no good either.
