@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.clearance.turn_easing import eased_turns
+from octo_motion.core.locomotion.clearance.turn_easing import eased_turns, where_it_helps
 from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_arm
 from octo_motion.core.rotations import Floats, from_axis_angle
 from tests.core.rigs import body_with_arms
@@ -88,3 +88,32 @@ def test_a_gait_in_a_hurry_may_turn_faster() -> None:
     free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
     assert eased_turns(arms, rotations, STILL, free, rate=24.0, per_cycle=24.0) is None
     assert eased_turns(arms, rotations, STILL, free, rate=24.0, per_cycle=60.0) is not None
+
+
+def test_each_stretch_counts_by_itself() -> None:
+    """What cannot be helped at one place spoils nothing at another."""
+    arms = arms_of()
+    bones = len(arms[0].bones)
+    free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
+    most = FASTEST / 24.0
+    # A little too fast early on, far too fast later.
+    before = flipping(1.1 * most, 60, len(arms), bones, 3)
+    before[180:, 3] = from_axis_angle(np.array([1.0, 0.0, 0.0]), np.array(4.0 * most))
+    eased, _ = eased_turns(arms, before, STILL, free, rate=24.0, per_cycle=SLOWLY) or (before, None)
+    assert largest(eased) <= 1.001 * most
+    # Something brings the later one back nearly to where it was.
+    spoilt = eased.copy()
+    spoilt[120:] = before[120:]
+    spoilt[180] = spoilt[179]
+    found = where_it_helps(arms, before, spoilt, STILL, most=most)
+    assert largest(found[:120]) <= 1.001 * most
+    np.testing.assert_array_equal(found[120:], before[120:])
+
+
+def test_a_stretch_in_which_nothing_was_too_fast_stays_as_it_was() -> None:
+    arms = arms_of()
+    most = FASTEST / 24.0
+    before = flipping(0.9 * most, 120, len(arms), len(arms[0].bones), 3)
+    changed = before.copy()
+    changed[118:123, 3] = before[118, 3]
+    np.testing.assert_array_equal(where_it_helps(arms, before, changed, STILL, most=most), before)
