@@ -27,9 +27,9 @@ _TIME: Final = 0.01
 """… and in a single cycle."""
 _ASIDE: Final = np.radians(5.0)
 """How far to either side of where it would, such an arm takes hold at most …"""
-_REACH: Final = 0.02
-"""… and how many arm lengths nearer or farther. At 0.05 they come off before they let go, and drift
-by 1 % of their length instead of 0.45 %."""
+_REACH: Final = 0.01
+"""… and how many arm lengths nearer or farther. At 0.02 arms of Curl come off before they let go,
+and drift by 1 % of their length instead of 0.65 %."""
 _MORE_BENT: Final = np.radians(8.0)
 """By how much it lies there bent otherwise. At 20° Idle turns by 11.2° in a frame instead of 9.6°.
 """

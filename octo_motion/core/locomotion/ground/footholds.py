@@ -426,26 +426,23 @@ def lay(
         cyclic: whether there are none, so that each cycle is like the one before …
         uneven: … but for what holds differ by in place.
     """
-    first, last = cycles
-    numbers = np.arange(first, last + 1)
+    numbers = np.arange(cycles[0], cycles[1] + 1)
     shape = len(limbs.arms), len(numbers)
-    overridden = _overridden(limbs, shape, first, contact_overrides)
-    differing = np.zeros((4, *shape)) if uneven is None else uneven.of(limbs.arms, numbers)
-    shift = overridden.shift + differing[0]
+    overridden = _overridden(limbs, shape, cycles[0], contact_overrides)
+    late, *beside, bent = _differing(uneven, limbs, numbers)
+    shift = overridden.shift + late
     roots = _RootPath(limbs, line, timing, numbers, middle / CYCLE)
-    curl = _curls(limbs, 0 * numbers if cyclic else numbers, seed) + differing[3]
+    curl = _curls(limbs, 0 * numbers if cyclic else numbers, seed) + bent
     joint = limbs.touching(settings.planted)
-    spot, lie, half = _places(roots, shift, ground, settings, differing[1:3])
-    spot, half, firm = _over_gaps(roots, (shift, half), ground, settings, (spot, lie))
-    spot = np.where(overridden.moved[..., None], overridden.places, spot)
-    heading = np.where(overridden.turned, overridden.headings, np.arctan2(lie[..., 1], lie[..., 0]))
+    spot, lie, half, firm = _places(roots, shift, ground, settings, beside)
+    spot, heading = overridden.put(spot, np.arctan2(lie[..., 1], lie[..., 0]))
     # As if they were round.
     skins = np.broadcast_to(limbs.radii[joint:].T[:, None], (*shape, len(limbs.radii) - joint))
     joints = laid(limbs, ground, joint, skins=skins, spot=spot, heading=heading, curl=curl)
     touch_down, lift_off, middles = _times(shift, half)
     at_touch_down, at_lift_off = roots.at(np.stack([touch_down, lift_off]))[0]
     return Footholds(
-        first=first,
+        first=cycles[0],
         touching=joint,
         touch_down=touch_down,
         lift_off=lift_off,
@@ -506,11 +503,16 @@ class _RootPath:
 
 
 def _places(
-    path: _RootPath, shift: Floats, ground: Ground, settings: StanceSettings, beside: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Where arms touch (arms, cycles, 3), which way they lie (arms, cycles, 2), and half of how
-    long they do (arms, cycles), in cycles; stances (arms, cycles) are shifted by so many cycles,
-    and places are beside the usual ones by radians and arm lengths (2, arms, cycles).
+    path: _RootPath,
+    shift: Floats,
+    ground: Ground,
+    settings: StanceSettings,
+    beside: Sequence[Floats],
+) -> tuple[Floats, Floats, Floats, np.ndarray]:
+    """Where arms touch (arms, cycles, 3), which way they lie (arms, cycles, 2), half of how long
+    they do (arms, cycles), in cycles, and whether at all (arms, cycles); stances (arms, cycles) are
+    shifted by so many cycles, and places are beside the usual ones by radians and arm lengths
+    (arms, cycles).
     """
     limbs = path.limbs
     turns, away = path.timing.aims(limbs.arms, path.numbers)
@@ -529,7 +531,16 @@ def _places(
     distance, half = spots(limbs, ground, settings, passings, aim=aim, away=away, farther=farther)
     spot = roots.copy()
     spot[..., :2] += distance[..., None] * aim
-    return spot, lie, half * _unturned(path, shift, half)
+    half = half * _unturned(path, shift, half)
+    spot, half, firm = _over_gaps(path, (shift, half), ground, settings, (spot, lie))
+    return spot, lie, half, firm
+
+
+def _differing(uneven: UnevenHolds | None, limbs: Limbs, cycles: np.ndarray) -> Floats:
+    """What holds in cycles (cycles,) differ by (4, arms, cycles), as ``UnevenHolds`` has it."""
+    if uneven is None:
+        return np.zeros((4, len(limbs.arms), len(cycles)))
+    return uneven.of(limbs.arms, cycles)
 
 
 def _unturned(path: _RootPath, shift: Floats, half: Floats) -> Floats:
@@ -638,6 +649,11 @@ class _Overridden:
     places: Floats
     turned: np.ndarray
     headings: Floats
+
+    def put(self, spot: Floats, heading: Floats) -> tuple[Floats, Floats]:
+        """Places (arms, cycles, 3) and headings (arms, cycles), but where others are wished for."""
+        places = np.where(self.moved[..., None], self.places, spot)
+        return places, np.where(self.turned, self.headings, heading)
 
 
 def _overridden(

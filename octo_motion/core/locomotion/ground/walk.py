@@ -419,10 +419,6 @@ class GroundedWalk:
         sides = [sucker_sides(skeleton, arm.bones, down) for arm in poser.arms]
         # Where nothing varies at random, the seed does not matter.
         seed = poser.settings.seed if any(poser.settings.variation) else 0
-        uneven = None
-        if cyclic and poser.settings.uneven > 0.0:
-            periods = self._timing.cycle_period or poser.settings.period
-            uneven = UnevenHolds(poser.settings.uneven, poser.settings.seed, periods)
         self._ends = np.cumsum([0] + [len(arm.bones) for arm in poser.arms])
         self._parts: list[WalkPart] = []
         for build in poser.builds:
@@ -433,17 +429,13 @@ class GroundedWalk:
                     poser, own, radii, scale=scale, planted=settings.planted, may_stretch=stretch
                 )
                 footholds = lay(
-                    limbs,
-                    line,
-                    ground,
-                    settings,
-                    self._timing,
+                    *(limbs, line, ground, settings, self._timing),
                     middle=self._middle,
                     cycles=self._cycles,
                     contact_overrides=contact_overrides,
                     seed=seed,
                     cyclic=cyclic,
-                    uneven=uneven,
+                    uneven=self._uneven,
                 )
                 self._parts.append(WalkPart(poser, ground, settings, sides, own, limbs, footholds))
         if not self._are_round(skins):
@@ -452,6 +444,15 @@ class GroundedWalk:
                 replace(part, footholds=relaid(part.footholds, part.limbs, ground, own))
                 for part, own in zip(self._parts, below, strict=True)
             ]
+
+    @property
+    def _uneven(self) -> UnevenHolds | None:
+        """How holds differ in place; none on the way, where the ground sees to it."""
+        settings = self._poser.settings
+        if not self._cyclic or settings.uneven <= 0.0:
+            return None
+        periods = self._timing.cycle_period or settings.period
+        return UnevenHolds(settings.uneven, settings.seed, periods)
 
     def _are_round(self, skins: Sequence[ArmSkin]) -> bool:
         return not skins or all(
