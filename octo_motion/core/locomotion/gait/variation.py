@@ -21,17 +21,17 @@ _LATE: Final = 0.02 * CYCLE, 0.003 * CYCLE
 and in a single cycle. More of the latter would make strokes hasty …"""
 _UNLIKE: Final = np.radians([[3.0, 3.0], [4.0, 4.0], [7.0, 7.0]])
 """(links, 2) … and by how much their head and pitch differ: how far they reach, and curl."""
-_OWN_TIME: Final = 0.015
+_OWN_TIME: Final = 0.004
 """Cycles by which arms that rest on the ground in place are ahead or late at most: always …"""
-_TIME: Final = 0.01
-"""… and in a single cycle."""
-_ASIDE: Final = np.radians(5.0)
+_TIME: Final = 0.003
+"""… and in a single cycle. At 0.015 and 0.01 arms of Idle cross each other for longer."""
+_ASIDE: Final = np.radians(4.0)
 """How far to either side of where it would, such an arm takes hold at most …"""
 _REACH: Final = 0.01
 """… and how many arm lengths nearer or farther. At 0.02 arms of Curl come off before they let go,
 and drift by 1 % of their length instead of 0.65 %."""
-_MORE_BENT: Final = np.radians(8.0)
-"""By how much it lies there bent otherwise. At 20° Idle turns by 11.2° in a frame instead of 9.6°.
+_MORE_BENT: Final = np.radians(6.0)
+"""By how much it lies there bent otherwise. At 20° Idle turns by 11.2° in a frame instead of 9.3°.
 """
 
 
