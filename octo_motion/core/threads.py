@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several pieces of work at once, by as many threads as there are processors for this process.
+"""Several pieces of work at once, by as many threads as there are processors to spare.
 
-What takes long is numpy on large arrays, and numpy lets other threads go on meanwhile. The pieces
-are the same however many threads there are, each is worked out by one of them, and none reads what
-another writes: so the numbers are the same to the last bit. No thread outlives the call that has
-begun it, so Blender never goes on while Python works elsewhere.
+What takes long is numpy on large arrays, and numpy lets other threads go on meanwhile. Each piece
+is worked out by one thread, none reads what another writes, and no number hangs on where a piece
+begins: so results are the same to the last bit, however many threads there are. No thread outlives
+the call that has begun it, so Blender never goes on while Python works elsewhere.
 
-Who gives each process a processor of its own, as farms do (``taskset``, ``sched_setaffinity``, a
-container's set of processors), gets one thread.
+Only processors with nothing to do are taken: beside other programs threads would wait for each
+other's turn, and on farms that run a process for each processor there is none to spare.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import time
 from collections.abc import Callable, Generator, Sequence
 from contextvars import copy_context
 from itertools import count, pairwise
+from pathlib import Path
 from threading import Thread
 from typing import Any, Final, TypeVar
 
@@ -25,16 +26,45 @@ _Item = TypeVar("_Item")
 
 _MOST: Final = 4
 """Threads at once: beyond, they mostly wait for the interpreter and for memory."""
+_GLANCE: Final = 0.05
+"""Seconds between two looks at what else is running."""
 _TURN: Final = 0.004
 """Seconds after which a thread that works in steps takes no further one before all have met."""
 
 
+class _Others:
+    """What else wants the processors, looked at now and then."""
+
+    def __init__(self) -> None:
+        self._until, self._found = -1.0, 0
+
+    def count(self) -> int:
+        """Threads of this machine that run or could, without the one that asks."""
+        now = time.perf_counter()
+        if now > self._until:
+            self._until, self._found = now + _GLANCE, self._running()
+        return self._found
+
+    @staticmethod
+    def _running() -> int:
+        try:
+            # Averages, runnable/all … [proc(5)]. Windows and macOS do not say so for nothing.
+            runnable = Path("/proc/loadavg").read_text(encoding="ascii").split()[3]
+            return max(int(runnable.split("/")[0]) - 1, 0)
+        except (OSError, ValueError, IndexError):
+            return 0
+
+
+_others: Final = _Others()
+
+
 def thread_count() -> int:
-    """How many threads work at once."""
+    """How many threads work at once: one, and one for each processor with nothing to do that this
+    process may use.
+    """
     affinity = getattr(os, "sched_getaffinity", None)
-    # Windows and macOS do not say which processors are a process's own.
     own = len(affinity(0)) if affinity is not None else os.cpu_count() or 1
-    return min(own, _MOST)
+    return max(min(own - _others.count(), _MOST), 1) if own > 1 else 1
 
 
 def each_of(work: Callable[[_Item], _Outcome], items: Sequence[_Item]) -> list[_Outcome]:

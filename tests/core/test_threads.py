@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import hashlib
+import sys
 import threading
+import time
 from collections.abc import Generator
 
 import numpy as np
@@ -24,13 +27,39 @@ def several(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     return request.param
 
 
-def test_a_process_that_is_bound_to_one_processor_has_one_thread(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(
+    ("own", "others", "expected"),
+    [(1, 0, 1), (2, 0, 2), (2, 1, 1), (2, 9, 1), (64, 0, 4), (4, 2, 2)],
+)
+def test_only_processors_with_nothing_to_do_are_taken(
+    own: int, others: int, expected: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(threads.os, "sched_getaffinity", lambda _: {3}, raising=False)
-    assert thread_count() == 1
-    monkeypatch.setattr(threads.os, "sched_getaffinity", lambda _: set(range(64)), raising=False)
-    assert 1 < thread_count() < 64
+    monkeypatch.setattr(threads.os, "sched_getaffinity", lambda _: set(range(own)), raising=False)
+    monkeypatch.setattr(threads._Others, "count", lambda _: others)
+    assert thread_count() == expected
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nothing says so")
+def test_what_else_runs_is_seen() -> None:
+    stop = threading.Event()
+
+    def hash_on() -> None:
+        # Without the interpreter's lock, which this thread has.
+        while not stop.is_set():
+            hashlib.pbkdf2_hmac("sha256", b"", b"", 200_000)
+
+    others = [threading.Thread(target=hash_on) for _ in range(3)]
+    for other in others:
+        other.start()
+    try:
+        until = time.perf_counter() + 20.0
+        while threads._Others().count() < 2:
+            assert time.perf_counter() < until
+            time.sleep(0.01)
+    finally:
+        stop.set()
+        for other in others:
+            other.join()
 
 
 def test_each_item_is_worked_on_once_and_results_are_in_order(several: int) -> None:
