@@ -9,7 +9,6 @@ import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
-from threading import Lock
 from typing import Any, Final, Generic, Literal, TypeVar
 
 import numpy as np
@@ -58,7 +57,6 @@ class ContentCache(Generic[_Result]):
     def __init__(self, most: int = 8) -> None:
         self._most = most
         self._kept: OrderedDict[bytes, _Result] = OrderedDict()
-        self._lock = Lock()
         _ALL.add(self)
 
     def get(self, key: bytes, make: Callable[[], _Result]) -> _Result:
@@ -66,15 +64,13 @@ class ContentCache(Generic[_Result]):
         on), else what is made now; if that raises, nothing is kept. It must not be changed
         afterwards.
         """
-        with self._lock:
-            if key in self._kept:
-                self._kept.move_to_end(key)
-                return self._kept[key]
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return self._kept[key]
         made = make()
-        with self._lock:
-            self._kept[key] = made
-            while len(self._kept) > self._most:
-                self._kept.popitem(last=False)
+        self._kept[key] = made
+        while len(self._kept) > self._most:
+            self._kept.popitem(last=False)
         return made
 
     def known(self, key: bytes) -> _Result | None:

@@ -16,13 +16,3 @@ def finished(steps: Generator[Any, None, _Outcome]) -> _Outcome:
             next(steps)
         except StopIteration as last:
             return last.value
-
-
-def saying(share: float, steps: Generator[Any, None, _Outcome]) -> Generator[float, None, _Outcome]:
-    """The same steps, each of which yields the share of a whole that is done."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as last:
-            return last.value
-        yield share

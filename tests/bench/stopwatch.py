@@ -1,14 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the time of a run is spent, each second counted once.
-
-What threads do that others have begun is not counted: whoever has begun them waits meanwhile.
-"""
+"""Where the time of a run is spent, each second counted once."""
 
 from __future__ import annotations
 
 import functools
 import inspect
-import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable, Generator, Iterator
@@ -25,14 +21,10 @@ class Stopwatch:
     def __init__(self) -> None:
         self.seconds: defaultdict[str, float] = defaultdict(float)
         self._inner: list[float] = [0.0]
-        self._thread = threading.get_ident()
 
     @contextmanager
     def measure(self, label: str) -> Iterator[None]:
         """Count the block's time, without that of measured blocks within it."""
-        if threading.get_ident() != self._thread:
-            yield
-            return
         self._inner.append(0.0)
         start = time.perf_counter()
         try:

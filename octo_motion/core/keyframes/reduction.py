@@ -23,7 +23,6 @@ import numpy as np
 from ..errors import SettingsError
 from ..rotations import Floats
 from ..steps import finished
-from ..threads import abreast
 from .channels import BezierKeys, Booleans
 from .dense import dense_keys
 from .key_times import Choice
@@ -101,24 +100,21 @@ def reducing(
     plans = [_Plan.of(limb, len(times)) for limb in limbs]
     for share in _choose(times, plans, every):
         yield _CHOOSING * share
-    parts = [len(limb.tracks) / max(sum(len(each.tracks) for each in limbs), 1) for limb in limbs]
-    steps = abreast([_searched(times, plan, every, loops=loops) for plan in plans])
-    while True:
-        try:
-            said = next(steps)
-        except StopIteration as last:
-            return last.value
-        share = sum(part * (each or 0.0) for part, each in zip(parts, said, strict=True))
-        yield _CHOOSING + (1.0 - _CHOOSING) * share
-
-
-def _searched(
-    times: Floats, plan: _Plan, every: int, *, loops: bool
-) -> Generator[float, None, list[BezierKeys]]:
-    """The keys of a limb's tracks, in steps that yield the share that is done."""
-    fine = looked_at(times, plan.limb, every)
-    steps = searched(fine, fine.marked(plan.keyed), fine.marked(plan.corners), loops=loops)
-    return (yield from steps)
+    result: list[list[BezierKeys]] = []
+    done, whole = 0, max(sum(len(limb.tracks) for limb in limbs), 1)
+    for plan in plans:
+        fine = looked_at(times, plan.limb, every)
+        own = len(plan.limb.tracks)
+        steps = searched(fine, fine.marked(plan.keyed), fine.marked(plan.corners), loops=loops)
+        while True:
+            try:
+                share = next(steps)
+            except StopIteration as last:
+                result.append(last.value)
+                break
+            yield _CHOOSING + (1.0 - _CHOOSING) * (done + own * share) / whole
+        done += own
+    return result
 
 
 def _dense(

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from octo_motion.blender.scene.curves import read_route
-from octo_motion.core import threads
 from octo_motion.core.errors import OctoMotionError
 from octo_motion.core.locomotion.clearance import capsule_overlap, overlap_solver
 from octo_motion.core.locomotion.gait.gait_poser import GaitPoser
@@ -329,7 +328,6 @@ def test_work_in_small_steps_gives_the_same_keys(
 ) -> None:
     first = {key: values.tobytes() for key, values in keys(generate(octopus)).items()}
     monkeypatch.setattr(pipeline, "_BONES_AT_ONCE", 24 * 7)
-    monkeypatch.setattr(threads, "_MOST", 1)
     shot = prepare(octopus, bpy.context)
     progress = list(shot.compute())
     # Twice as many moments as frames: it is a hurry.
@@ -340,26 +338,15 @@ def test_work_in_small_steps_gives_the_same_keys(
     assert {key: values.tobytes() for key, values in keys(action).items()} == first
 
 
-@pytest.mark.parametrize("kept", ["DENSE", "REDUCED"])
-def test_any_number_of_threads_gives_the_same_keys(
-    octopus: Any, kept: str, monkeypatch: pytest.MonkeyPatch
+def test_portions_of_any_size_give_the_same_keys(
+    octopus: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    settings_of(octopus).keys = kept
     first = {key: values.tobytes() for key, values in keys(generate(octopus)).items()}
-    monkeypatch.setattr(pipeline, "_BONES_AT_ONCE", 24 * 16)
     monkeypatch.setattr(overlap_solver, "_ARMS_AT_ONCE", 5)
     monkeypatch.setattr(overlap_solver, "_COLUMNS_AT_ONCE", 3)
     monkeypatch.setattr(capsule_overlap, "_AT_ONCE", 2000)
     monkeypatch.setattr(capsule_overlap, "_ROWS_AT_ONCE", 100)
-    monkeypatch.setattr(threads._Others, "count", lambda _: 0)
-    for count in (1, 2, 3):
-        processors = set(range(count))
-        monkeypatch.setattr(
-            threads.os, "sched_getaffinity", lambda _, own=processors: own, raising=False
-        )
-        assert threads.thread_count() == count
-        again = {key: values.tobytes() for key, values in keys(generate(octopus)).items()}
-        assert again == first
+    assert {key: values.tobytes() for key, values in keys(generate(octopus)).items()} == first
 
 
 def test_two_octopuses_in_one_scene_do_not_touch_each_other(octopus: Any) -> None:
@@ -1019,7 +1006,6 @@ def long_job(octopus: Any, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Any]:
     settings_of(octopus).tell_overlaps = False
     settings_of(octopus).frame_end = 120
     monkeypatch.setattr(pipeline, "_BONES_AT_ONCE", 24 * 6)
-    monkeypatch.setattr(threads, "_MOST", 1)
     monkeypatch.setattr("octo_motion.ui.locomotion.operators.generate.PATIENCE", 0.0)
     monkeypatch.setattr(ModalJob, "_turn", 0.0)
     operator, window = Operator(), Window()

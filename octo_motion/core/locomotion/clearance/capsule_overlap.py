@@ -18,10 +18,10 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from ...content_cache import part_of
+from ...portions import portions
 from ...rotations import Floats
 from ...rotations.components_first import dot
 from ...smoothing import smooth_step
-from ...threads import each_of, pieces
 
 _Made = TypeVar("_Made")
 
@@ -226,7 +226,7 @@ def near(
     Args:
         middles: where capsules are.
         pairs: numbers (pairs,) and (pairs,) of those that count, the first of an earlier chain.
-        make: what is to become of some that are near; of several pieces by several threads.
+        make: what is to become of some that are near.
         margin: radii by which they may be apart …
         slack: … and by which they may be so in the unit of the joints.
         anew: (frames, chains) whose capsules are asked for, each with all others; else all are.
@@ -240,7 +240,7 @@ def near(
     limit[pairs] = ((size[pairs[0]] + size[pairs[1]]) * (1.0 + _ROUNDED)) ** 2 + rounding
     asked = np.ones((len(middles.places), owner.max() + 1), dtype=bool) if anew is None else anew
     search = _Search(middles, np.maximum(limit, limit.T), rounding, asked)
-    return each_of(lambda task: make(search.near_to(*task)), search.tasks())
+    return [make(search.near_to(*task)) for task in search.tasks()]
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +266,7 @@ class _Search:
             for row in range(first, last, rows):
                 own = slice(row, min(row + rows, last))
                 step = max(1, _AT_ONCE // ((own.stop - row) * count))
-                found += [(frames[each], own) for each in pieces(len(frames), step)]
+                found += [(frames[each], own) for each in portions(len(frames), step)]
         return found
 
     def near_to(self, frames: np.ndarray, own: slice) -> Near:
@@ -621,11 +621,11 @@ class Touching:
         return all_of(self.of_each(joints, lambda touches: touches))
 
     def of_each(self, joints: Floats, make: Callable[[Touches], _Made]) -> list[_Made]:
-        """What is made of some of that after the other, by several threads; one at least."""
+        """What is made of some of that after the other; one at least."""
         self._look_again(joints)
         points = self._points(joints)
-        every = pieces(self._rows.shape[1], _ROWS_AT_ONCE) or [slice(0, 0)]
-        return each_of(lambda piece: make(self._at(points, self._rows[:, piece])), every)
+        every = portions(self._rows.shape[1], _ROWS_AT_ONCE) or [slice(0, 0)]
+        return [make(self._at(points, self._rows[:, piece])) for piece in every]
 
     def _points(self, joints: Floats) -> Floats:
         """(3, points) where capsules start and end: joints (frames, arms, joints, 3), the body."""

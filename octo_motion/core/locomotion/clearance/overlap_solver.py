@@ -23,10 +23,10 @@ from typing import Final, Protocol
 import numpy as np
 
 from ...content_cache import part_of
+from ...portions import portions
 from ...rotations import Floats
 from ...rotations.components_first import dot
 from ...smoothing import blur_reach, blurred, covered, smooth_step, widened
-from ...threads import each_of, pieces
 from ..ground import drawn
 from ..rig import TOLERATED, lowest_allowed
 from .capsule_overlap import Capsules, Crowd, Touches, Touching, all_of, aside
@@ -356,10 +356,8 @@ class _Parting:
         size = _length(flat[:, asked])
         some = size.max(axis=0, initial=0.0) > 1e-6 * self._scale
         columns, size = asked[some], size[:, some]
-        each_of(
-            lambda part: self._spread_some(columns[part], flat, size[:, part], spread),
-            pieces(len(columns), _COLUMNS_AT_ONCE),
-        )
+        for part in portions(len(columns), _COLUMNS_AT_ONCE):
+            self._spread_some(columns[part], flat, size[:, part], spread)
         return result
 
     def _spread_some(
@@ -495,8 +493,8 @@ def _in_pieces(
     """Work on some arms (items,) and (items,) at their frames, so many at a time that all that is
     made of them stays in the cache.
     """
-    parts = pieces(len(chosen[0]), _ARMS_AT_ONCE)
-    each_of(work, [tuple(each[part] for each in chosen) for part in parts])
+    for part in portions(len(chosen[0]), _ARMS_AT_ONCE):
+        work(tuple(each[part] for each in chosen))
 
 
 def _within(before: Floats, after: Floats, free: Floats) -> Floats:

@@ -19,8 +19,6 @@ from ...content_cache import ContentCache, content_key
 from ...phrases import phrase
 from ...rotations import Floats, rotate
 from ...smoothing import least_jerk
-from ...steps import saying
-from ...threads import abreast, shares, thread_count
 from ..clearance import afloat
 from ..gait import CYCLE, GaitPoser, GaitTable
 from ..ground import (
@@ -446,6 +444,11 @@ class SegmentMotion:
         """The same, whose poses may be changed."""
         return SegmentMotion(self.arms.copy(), evened=self.evened)
 
+    def keep(self, stood: GroundedPoses, walk: GroundedWalk) -> None:
+        """Keep what raising arms asks for, of moments that follow those before."""
+        self.shapes.append(list(stood.shapes))
+        self.joints.append(walk.by_arm(stood.joints))
+
     def shapes_at(self, chosen: np.ndarray) -> tuple[Floats, ...] | None:
         """What is kept of some moments, none where nothing is."""
         if not self.shapes:
@@ -560,8 +563,8 @@ class Segments:
         """
         motion, count = SegmentedMotion(self, travel, places), len(travel.distance)
         motion.segments.append(SegmentMotion(ArmMotion.at_rest(count, self.bones)))
-        posing = motion.posing(0, np.arange(count), slice(0, count), None, cyclic=False)
-        motion.keep(0, np.arange(count), (yield from saying(0.5, posing)))
+        for _ in motion.posing(0, np.arange(count), slice(0, count), None, cyclic=False):
+            yield 0.5
         return motion.segments[0].arms
 
     def compute(
@@ -587,16 +590,11 @@ class Segments:
             )
             made = SegmentMotion(ArmMotion.at_rest(len(travel.distance), self.bones))
             motion.segments.append(made)
-            threads, chosen = thread_count(), shares(len(part), step)
-            for start in range(0, len(chosen), threads):
-                done = 0.9 * (segment + start / len(chosen)) / self.count
-                own = chosen[start : start + threads]
-                posing = abreast(
-                    [motion.posing(segment, part, each, smoothing, cyclic=cyclic) for each in own]
-                )
-                found = yield from saying(done, posing)
-                for each, stood in zip(own, found, strict=True):
-                    motion.keep(segment, part[each], stood)
+            for start in range(0, len(part), step):
+                chosen = slice(start, min(start + step, len(part)))
+                done = 0.9 * (segment + start / max(len(part), 1)) / self.count
+                for _ in motion.posing(segment, part, chosen, smoothing, cyclic=cyclic):
+                    yield done
             motion.calm(segment, np.arange(len(travel.distance)), made.arms)
         return motion
 
@@ -633,9 +631,8 @@ class SegmentedMotion:
         smoothing: SwingSmoothing | None,
         *,
         cyclic: bool,
-    ) -> Generator[None, None, GroundedPoses | None]:
-        """Pose the arms at a part of the moments (n,) of a segment, in steps; what :meth:`keep` is
-        to be told of them. Parts may be posed by several threads.
+    ) -> Generator[None, None, None]:
+        """Pose the arms at a part of the moments (n,) of a segment, in steps.
 
         Swings are evened out over time, or not. Cyclic, the last moment is the first again.
         """
@@ -647,7 +644,8 @@ class SegmentedMotion:
             posed = plan.gaits[number].poser.pose(travel.phase, travel.turn)
             arms.rotations[chosen] = posed.rotations
             arms.misses[chosen] = posed.misses.max(axis=2)
-            return None
+            yield
+            return
         around, own = frames_around(
             part, smoothing.reach if smoothing else 0, len(moments), cyclic=cyclic
         )
@@ -661,23 +659,15 @@ class SegmentedMotion:
         arms.cycles[chosen] = stood.cycles + _APART * number
         for arm, rests in zip(arms.in_contact, walk.by_arm(stood.in_contact), strict=True):
             arm[chosen] = rests
-        return stood
-
-    def keep(self, segment: int, moments: np.ndarray, stood: GroundedPoses | None) -> None:
-        """Keep what raising arms asks for, of moments (n,) that follow those before."""
-        made, walk = self.segments[segment], self.plan.walks[self.plan.gait_of(segment)]
-        if stood is None or walk is None:
-            return
         if not made.evened:
-            count = len(made.arms.late)
+            count = len(arms.late)
             made.evened.extend(
                 np.zeros((*each.shape[:2], count, each.shape[3])) for each in stood.evened
             )
         for whole, each in zip(made.evened, stood.evened, strict=True):
-            whole[:, :, moments] = each
-        if self.plan.transitions is None:
-            made.shapes.append(list(stood.shapes))
-            made.joints.append(walk.by_arm(stood.joints))
+            whole[:, :, chosen] = each
+        if plan.transitions is None:
+            made.keep(stood, walk)
 
     def _travel(self, number: int, chosen: np.ndarray) -> Travel:
         """The body at some moments as one of the gaits has it."""

@@ -37,7 +37,6 @@ from ...rotations import (
 )
 from ...rotations.components_first import cumulative_sum, dot
 from ...skeleton import Skeleton
-from ...threads import each_of, shares
 from .arm_chains import AXES, BodyFrame, joint_positions
 
 _NO_SIDE: Final = 0.1
@@ -502,32 +501,20 @@ def turns_in_world(
     count = max(len(rotations) - every, 0)
     result = np.empty((count, rotations.shape[1]))
     ends = np.cumsum([0, *(len(arm.bones) for arm in arms)])
-    batches = [
-        (np.stack([np.arange(*ends[number : number + 2]) for number in numbers], axis=-1), batch)
-        for numbers, batch in batches_by_bones(arms)
-    ]
-
-    def turn(portion: slice) -> None:
-        part, own = slice(portion.start, portion.stop + every), result[portion]
-        for bones, batch in batches:
-            own[:, bones] = _cosines(batch, rotations[part][:, bones], orientations[part], every)
-        np.abs(own, out=own)
-        np.minimum(own, 1.0, out=own)
-        np.arccos(own, out=own)
-        own *= 2.0
-
-    each_of(turn, shares(count, max(1, _TURNS_AT_ONCE // max(rotations.shape[1], 1))))
+    step = max(1, _TURNS_AT_ONCE // max(rotations.shape[1], 1))
+    for numbers, batch in batches_by_bones(arms):
+        bones = np.stack([np.arange(*ends[number : number + 2]) for number in numbers], axis=-1)
+        for start in range(0, count, step):
+            part = slice(start, min(start + step, count) + every)
+            own = rotations[part].transpose(1, 2, 0)[bones.T].transpose(1, 2, 0, 3)
+            arm = np.repeat(np.arange(len(numbers)), own.shape[3])
+            going = np.tile(orientations[part].T, (1, len(numbers)))
+            own = own.reshape(*own.shape[:2], -1)
+            world = batch.orientations(own, arm, going).reshape(*own.shape[:2], len(numbers), -1)
+            same = np.einsum("bcaf,bcaf->fba", world[..., every:], world[..., :-every])
+            result[part.start : part.stop - every, bones] = same
+    np.abs(result, out=result)
+    np.minimum(result, 1.0, out=result)
+    np.arccos(result, out=result)
+    result *= 2.0
     return result
-
-
-def _cosines(batch: ArmBatch, rotations: Floats, orientations: Floats, every: int) -> Floats:
-    """Cosines (moments − every, bones, arms) of half of what bones turn by in the world, of
-    rotations (moments, bones, arms, 4) in their rest frames and orientations (moments, 4).
-    """
-    arms = rotations.shape[2]
-    own = np.ascontiguousarray(rotations.transpose(1, 3, 2, 0))
-    arm = np.repeat(np.arange(arms), own.shape[3])
-    going = np.tile(orientations.T, (1, arms))
-    own = own.reshape(*own.shape[:2], -1)
-    world = batch.orientations(own, arm, going).reshape(*own.shape[:2], arms, -1)
-    return np.einsum("bcaf,bcaf->fba", world[..., every:], world[..., :-every])
