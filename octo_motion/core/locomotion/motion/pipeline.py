@@ -112,13 +112,13 @@ _EXACT_ANGLE: Final = np.radians(0.5)
 """Radians that keys on every frame may be off there …"""
 _EXACT_DISTANCE: Final = 0.002
 """… and arm lengths of an arm's tip."""
-_BONES_AT_ONCE: Final = 50_000
+_BONES_AT_ONCE: Final = 24_000
 """Bones times frames of one step of the work: some tens of megabytes."""
 _KEPT: Final = 2**25 - 2**16
 """Bytes of the largest arrays whose memory is kept: glibc keeps that of none beyond 2**25."""
 _EASINGS: Final = 4
 """How often bones that turn too fast are given more time, and kept off the ground again."""
-_TURNS: Final = 8
+_TURNS: Final = 4
 """Of one step where Blender goes on meanwhile; the numbers are the same."""
 _FLOOR_AROUND: Final = 2.5
 """Arm lengths to all sides of the body in which the floor is looked at …"""
