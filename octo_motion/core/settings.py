@@ -9,6 +9,7 @@ declared is no setting: it is worked out.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import Any, Final
@@ -78,14 +79,16 @@ def check_settings(settings: Any) -> None:
         value, declared = getattr(settings, each.name), each.metadata.get(_KEY)
         if not isinstance(value, float | int | tuple):
             continue
-        label = as_phrase(declared.label if declared else _title(each.name))
-        if not np.all(np.isfinite(value)):
-            raise SettingsError(phrase("{label} is not a number.", label=label), "Set it anew.")
+        known = np.all(np.isfinite(value)) if isinstance(value, tuple) else math.isfinite(value)
         low, high = (declared.low, declared.high) if declared else (None, None)
-        if (low is not None and value < low) or (high is not None and value > high):
-            raise SettingsError(
-                phrase("{label} is {value:g}.", label=label, value=value), _remedy(low, high)
-            )
+        if known and (low is None or value >= low) and (high is None or value <= high):
+            continue
+        label = as_phrase(declared.label if declared else _title(each.name))
+        if not known:
+            raise SettingsError(phrase("{label} is not a number.", label=label), "Set it anew.")
+        raise SettingsError(
+            phrase("{label} is {value:g}.", label=label, value=value), _remedy(low, high)
+        )
 
 
 def _title(name: str) -> str:

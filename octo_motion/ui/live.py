@@ -5,8 +5,8 @@ Blender tells after each update what has changed. If that is something that a mo
 a timer shows the frame in sight as it is going to be, outside the update; what changes in the
 meantime waits for the same turn. Once nothing has changed for a while, all of it is made anew, in
 short turns between which Blender goes on. What our own writing changes is let through Blender's
-update before we listen again. Where nothing is live, nobody is told of updates: thousands of objects
-may move with each frame.
+update before we listen again. Where nothing is live, nobody is told of updates: thousands of
+objects may move with each frame.
 """
 
 from __future__ import annotations

@@ -52,10 +52,10 @@ _BEING_WRITTEN: Final = ""
 _KINDS: Final = ("interpolation", "handle_left_type", "handle_right_type", "type")
 _PLACES: Final = ("co", "handle_left", "handle_right")
 """All that is kept of a key."""
-CHANNELS_AT_ONCE: Final = 12
+CHANNELS_AT_ONCE: Final = 6
 """How many get their keys at one step, while Blender goes on: with 700 frames that is a millisecond
-or two."""
-_CURVES_AT_ONCE: Final = 100
+or so."""
+_CURVES_AT_ONCE: Final = 50
 """How many are read at one step to see whether they have been edited."""
 _LEAST_SPACING: Final = 0.01
 """Blender takes keys that are no further apart, in frames, for one and the same."""

@@ -20,7 +20,7 @@ from .grasp_target import (
 from .imports import NOTE, ImportedClip, Up, import_clip, remove_clips
 from .loose_objects import LooseObject
 from .octopus import add_octopus, own_collection
-from .surfaces import is_enabled, read_motion, read_obstacle, read_triangles
+from .surfaces import is_enabled, read_ground_mesh, read_motion, read_obstacle, read_triangles
 
 __all__ = [
     "CARRIED",
@@ -47,6 +47,7 @@ __all__ = [
     "place_clip",
     "put_back",
     "read_form",
+    "read_ground_mesh",
     "read_markers",
     "read_motion",
     "read_obstacle",

@@ -12,6 +12,7 @@ from mathutils import Vector
 
 from ...core.content_cache import ContentCache, content_key
 from ...core.errors import GroundError, RigError
+from ...core.locomotion.ground import GroundMesh
 from ...core.phrases import phrase
 from ...core.posing.solver import Box, Capsule, Hull, Mesh, Obstacle, Plane, Sphere
 from ...core.rotations import Floats, from_matrix
@@ -36,9 +37,19 @@ _corners_known: Final[ContentCache[np.ndarray]] = ContentCache(2)
 def read_triangles(
     ground: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Floats, bytes]:
-    """The faces of a mesh object as it is seen, modifiers and all, (faces, 3, 3) world.
+    """The faces of a mesh object as of :func:`read_ground_mesh`, (faces, 3, 3) world.
 
     With them comes a key of their content, for what is made from them.
+
+    Raises:
+        GroundError: the object is no mesh, or has no faces.
+    """
+    mesh = read_ground_mesh(ground, depsgraph)
+    return mesh.triangles, mesh.content
+
+
+def read_ground_mesh(ground: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> GroundMesh:
+    """A mesh object as it is seen, modifiers and all.
 
     Raises:
         GroundError: the object is no mesh, or has no faces.
@@ -68,7 +79,7 @@ def read_triangles(
         moved = points.astype(np.float64) @ world[:3, :3].T + world[:3, 3]
         return moved[corners]
 
-    return _faces_known.get(key, placed), key
+    return GroundMesh(key, lambda: _faces_known.get(key, placed), content, world)
 
 
 def _corners(mesh: bpy.types.Mesh, points: np.ndarray) -> tuple[np.ndarray, bytes]:

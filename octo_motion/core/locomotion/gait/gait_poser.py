@@ -283,6 +283,49 @@ class ArmPoses:
     what the setting ``stretch_slack`` lets it and those before it reach beyond."""
 
 
+@dataclass(frozen=True, eq=False)
+class _Built:
+    """What arms are like in any gait."""
+
+    segments: list[Floats]
+    """Of each arm (bones,), armature units."""
+    lengths: Floats
+    """(arms,)"""
+    roots: Floats
+    """(arms, 3) P₀ in the body's frame, armature units."""
+    azimuths: Floats
+    """(arms,) where each one leads to, seen from the way that it goes."""
+    rests: list[ArmRest]
+
+
+def _built(skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame, lean: float) -> _Built:
+    """It, as it was found before while a gait alone has changed.
+
+    Raises:
+        RigError: arms share bones, or a bone does not exist.
+    """
+
+    def find() -> _Built:
+        _check_disjoint(arms)
+        for arm in arms:
+            chain_of(skeleton, arm.bones)
+        joints = [body.to_body(joint_positions(skeleton, arm.bones)) for arm in arms]
+        segments = [np.linalg.norm(np.diff(each, axis=0), axis=1) for each in joints]
+        around = partial(swim_azimuths, lean=lean) if lean else arm_azimuths
+        return _Built(
+            segments,
+            np.array([float(each.sum()) for each in segments]),
+            np.array([each[0] for each in joints]),
+            around(skeleton, [arm.bones for arm in arms], body),
+            [arm_rest(skeleton, arm.bones) for arm in arms],
+        )
+
+    return _known.get(content_key(skeleton, [arm.bones for arm in arms], body, lean), find)
+
+
+_known: Final[ContentCache[_Built]] = ContentCache(2)
+
+
 class GaitPoser:
     """Moves the arms of one body.
 
@@ -319,18 +362,11 @@ class GaitPoser:
         gait = settings.gait.for_pairs(max(arm.pair for arm in self.arms))
         settings = replace(settings, gait=gait)
         self.settings = settings
-        _check_disjoint(self.arms)
-        for arm in self.arms:
-            chain_of(skeleton, arm.bones)
-        joints = [body.to_body(joint_positions(skeleton, arm.bones)) for arm in self.arms]
-        segments = [np.linalg.norm(np.diff(each, axis=0), axis=1) for each in joints]
-        self.lengths = np.array([float(each.sum()) for each in segments])
-        self.roots = np.array([each[0] for each in joints])
-        # From an arm's own frame to the body's: azimuth counts from the front, −Y.
-        bones = [arm.bones for arm in self.arms]
         lean = 0.0 if gait.on_ground else settings.swim_lean
-        find = partial(swim_azimuths, lean=lean) if lean else arm_azimuths
-        azimuths = find(skeleton, bones, body)
+        built = _built(skeleton, self.arms, body, lean)
+        segments, self.lengths, self.roots = built.segments, built.lengths, built.roots
+        # From an arm's own frame to the body's: azimuth counts from the front, −Y.
+        azimuths = built.azimuths
         # The same to a body whose +Z is the way that it swims along.
         self._round = from_axis_angle(_UP, azimuths - 0.5 * np.pi)
         self.outward = self._round
@@ -339,8 +375,8 @@ class GaitPoser:
         # From an arm's own frame to armature space.
         self._to_armature = multiply(from_matrix(body.rotation), self.outward)
         self.rests = tuple(
-            replace(arm_rest(skeleton, arm.bones), outward=outward)
-            for arm, outward in zip(self.arms, self.opens_to, strict=True)
+            replace(rest, outward=outward)
+            for rest, outward in zip(built.rests, self.opens_to, strict=True)
         )
         self._hands = np.array([arm.handedness for arm in self.arms])
         self._pairs = tuple(arm.pair for arm in self.arms)
@@ -410,7 +446,10 @@ class GaitPoser:
             angles = gait_angles(gait, own, pairs, smoothing_cycles=self.settings.smoothing_cycles)
             angles[..., [PITCH, BANK]] *= self._hands[chosen][:, None, None]
             # Not from what is kept: that does not know the floor.
-            directions, _ = self._shapes(part, angles, np.zeros((1, len(chosen))))
+            steering = np.zeros((1, len(chosen)))
+            asked = self.chains(part, angles, steering)
+            shaping = self.shaping(part, angles, steering, asked, rough=self.rough)
+            (directions,) = deque(shaping, maxlen=1)
             # Up is the same for the arm's frame and the body's.
             climbs = cumulative_sum(build.chain.lengths[:, None, None] * directions[:, 2])
             lowest = np.minimum(climbs.min(axis=0), 0.0)

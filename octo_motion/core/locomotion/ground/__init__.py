@@ -19,6 +19,7 @@ from .moving import Carpet, MovingMesh, turn_between
 from .surface import (
     Ground,
     GroundedPoses,
+    GroundMesh,
     HeightField,
     LevelGround,
     Raise,
@@ -39,6 +40,7 @@ __all__ = [
     "CrawlingBody",
     "EvenTiming",
     "Ground",
+    "GroundMesh",
     "GroundedPoses",
     "GroundedWalk",
     "HeightField",

@@ -45,6 +45,8 @@ _UPRIGHT: Final = 0.76
 that Tiptoe, the highest, turns by 0.74 radians from frame to frame instead of 0.53."""
 _TAUT: Final = 0.94
 """The same at its longest. At 0.99 arms stretch by 0.28 instead of 0.25."""
+_LOOKED_AT: Final = 16
+"""Places along an arm at which it is looked at whether it is peeled off."""
 _SLACKEST: Final = 0.55
 """The same at its shortest: an arm that is slacker has to fold. Less changes nothing where arms may
 shorten; at 1.1 Hurry slips by 0.0032 arm lengths instead of 0.0011."""
@@ -232,20 +234,17 @@ def peeled_to(limbs: Limbs, joint: int, joints: Floats, roots: Floats) -> Floats
     """
     along = limbs.reach[joint:]
     first, last = along[0][:, None], along[-1][:, None]
-    result = np.broadcast_to(first, roots.shape[:2]).copy()
     if len(along) <= _FEW:
-        return result
-    arms, cycles = np.indices(result.shape)
-    for share in np.linspace(0.0, 1.0 - _LEFT, 16):
-        place = share * (last - first) + first
-        number = np.clip((along[1:-1, :, None] < place).sum(axis=0), 0, len(along) - 2)
-        number = np.broadcast_to(number, result.shape)
-        low, high = along[number, arms], along[number + 1, arms]
-        within = ((place - low) / (high - low))[..., None]
-        start, end = joints[arms, cycles, number], joints[arms, cycles, number + 1]
-        apart = np.linalg.norm(start + within * (end - start) - roots, axis=-1)
-        result = np.where(apart >= _SLACK * place, np.maximum(result, place), result)
-    return result
+        return np.broadcast_to(first, roots.shape[:2]).copy()
+    arms, cycles = np.arange(roots.shape[0])[:, None], np.arange(roots.shape[1])
+    shares = np.linspace(0.0, 1.0 - _LEFT, _LOOKED_AT)[:, None, None]
+    place = shares * (last - first) + first
+    number = np.minimum((along[1:-1, None, :, None] < place).sum(axis=0), len(along) - 2)
+    low, high = along[number, arms], along[number + 1, arms]
+    within = ((place - low) / (high - low))[..., None]
+    start, end = joints[arms, cycles, number], joints[arms, cycles, number + 1]
+    apart = np.linalg.norm(start + within * (end - start) - roots, axis=-1)
+    return np.where(apart >= _SLACK * place, place, first).max(axis=0)
 
 
 # --- Places on uneven ground where an arm lies well -----------------------------------------------

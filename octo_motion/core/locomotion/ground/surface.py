@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final, Protocol
 
 import numpy as np
@@ -47,6 +48,36 @@ _single_known: Final[ContentCache[HeightField | None]] = ContentCache(3)
 _extents: Final[ContentCache[tuple[Floats, Floats]]] = ContentCache(3)
 
 
+@dataclass(frozen=True, eq=False)
+class GroundMesh:
+    """A mesh that is walked on, as it stands in the world."""
+
+    content: bytes
+    """A key of what its faces are in the world."""
+    make: Callable[[], Floats]
+    """What gives these, which takes a while."""
+    shape: bytes = b""
+    """A key of what the mesh is in its own space …"""
+    world: Floats | None = None
+    """… and that space (4, 4); none where that is not known."""
+
+    @cached_property
+    def triangles(self) -> Floats:
+        """(triangles, 3, 3) world."""
+        return self.make()
+
+    def shift_from(self, other: GroundMesh) -> Floats | None:
+        """Metres (3,) by which it stands elsewhere than another one; none if it is another one, or
+        turned or scaled.
+        """
+        if self.content == other.content:
+            return np.zeros(3)
+        if self.world is None or other.world is None or self.shape != other.shape:
+            return None
+        apart = self.world - other.world
+        return None if apart[:3, :3].any() else apart[:3, 3]
+
+
 class Ground(Protocol):
     """A surface over the world's XY plane."""
 
@@ -56,6 +87,10 @@ class Ground(Protocol):
 
     def slope(self, points: Floats) -> Floats:
         """Rise per metre along X and Y (…, 2)."""
+        ...
+
+    def moved(self, shift: Floats) -> Ground:
+        """The same elsewhere, by (3,) metres."""
         ...
 
 
@@ -84,6 +119,10 @@ class LevelGround:
     def slope(self, points: Floats) -> Floats:
         """Rise (…, 2)."""
         return np.broadcast_to(np.array(self.rise), (*points.shape[:-1], 2))
+
+    def moved(self, shift: Floats) -> LevelGround:
+        """The same elsewhere, by (3,) metres."""
+        return replace(self, z=self.z + float(shift[2] - np.dot(shift[:2], self.rise)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +166,12 @@ class HeightField:
         step = self.spacing * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
         around = self.height(at + step.reshape(4, *[1] * (at.ndim - 1), 2))
         return np.moveaxis(around[:2] - around[2:], 0, -1) * (0.5 / self.spacing)
+
+    def moved(self, shift: Floats) -> HeightField:
+        """The same elsewhere, by (3,) metres."""
+        x, y, up = shift.tolist()
+        place = self.origin[0] + x, self.origin[1] + y
+        return replace(self, origin=place, heights=self.heights + up)
 
     def rounded(self, radius: float) -> HeightField:
         """The same with its edges rounded off outwards, for bones, which are straight.

@@ -17,7 +17,7 @@ from ...skeleton import Skeleton
 from ..body import BodySettings, Organs
 from ..clearance import BodyVolume
 from ..gait import Arm, GaitSettings
-from ..ground import ContactOverride, MovingMesh, StanceSettings
+from ..ground import ContactOverride, GroundMesh, MovingMesh, StanceSettings
 from ..path import Route, TravelSettings
 from ..reaching import Reaching
 from ..rig import ArmSkin, BodyFrame
@@ -86,8 +86,8 @@ class GroundJob:
     """Of each arm."""
     may_stretch: Sequence[bool]
     """For each arm, whether its bones may get longer."""
-    mesh: tuple[Floats, bytes] | None
-    """Triangles (triangles, 3, 3), world, and a key of their content; none to follow the route."""
+    mesh: GroundMesh | None
+    """None to follow the route."""
     moving: MovingMesh | None = None
     """How that moves meanwhile; none where it stays. Then the mesh is that of its first frame."""
     overrides: tuple[ContactOverride, ...] = ()

@@ -56,7 +56,7 @@ from .handover import (
     near_enough,
 )
 from .job import Creature, MotionJob, Tolerances, Trailing
-from .planning import MotionPlan, frames_of_arms, plan_motion
+from .planning import MotionPlan, frames_of_arms, plan_motion, scaled
 from .segments import SegmentedMotion
 from .trailing import trailed
 
@@ -155,8 +155,8 @@ def compute(job: MotionJob, *, brief: bool = False) -> Steps[MotionResult]:
         OctoMotionError: something is wrong that the user can put right.
     """
     keep_memory()
-    plan = yield from _scaled(plan_motion(job), 0.0, _PLANNING)
-    return (yield from _scaled(pose(plan, brief=brief), _PLANNING, 1.0))
+    plan = yield from scaled(plan_motion(job), 0.0, _PLANNING)
+    return (yield from scaled(pose(plan, brief=brief), _PLANNING, 1.0))
 
 
 def keep_memory() -> None:
@@ -183,9 +183,9 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     step = max(1, at_once // max(len(plan.first.poser.bones), 1))
     posing = _posed(plan, times, step, cyclic=plan.job.in_place)
     trailing = plan.job.body.trailing
-    posed = yield from _scaled(posing, 0.0, _TRAILING * moving if trailing else moving)
+    posed = yield from scaled(posing, 0.0, _TRAILING * moving if trailing else moving)
     if trailing is not None:
-        yield from _scaled(_trail(plan, trailing, posed), _TRAILING * moving, moving)
+        yield from scaled(_trail(plan, trailing, posed), _TRAILING * moving, moving)
     if posed.hands:
         _hand_over(plan, posed)
     yield moving
@@ -207,7 +207,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     channels = [*motion.travel, *motion.arms, *motion.mantle, *motion.widths, *motion.stretch]
     if reducing:
         yield moving
-        channels = yield from _scaled(_reduced(plan, motion, moments, every), moving, 1.0)
+        channels = yield from scaled(_reduced(plan, motion, moments, every), moving, 1.0)
         if measured is not None and plan.carry is None:
             travels = not plan.job.in_place
             measuring = measuring_keyed(measured, plan.job.creature, channels, travels=travels)
@@ -323,7 +323,7 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     reached = _reach(plan, arms, keyed, going) if plan.carry is None else None
     yield 0.96
     making_way = _separate(plan, arms, reached, going, swimming=swimming, cyclic=cyclic)
-    warnings = yield from _scaled(making_way, 0.96, 0.98)
+    warnings = yield from scaled(making_way, 0.96, 0.98)
     yield 0.98
     _take_time(plan, arms, reached, going, cyclic=cyclic)
     planned = None
@@ -497,16 +497,6 @@ class Glimpse:
     """Of all channels."""
     known: KnownMotion
     """The moments around it."""
-
-
-def _scaled(steps: Steps[_Outcome], start: float, end: float) -> Steps[_Outcome]:
-    """Steps that are a part of the whole work, from one share of it to another."""
-    while True:
-        try:
-            share = next(steps)
-        except StopIteration as last:
-            return last.value
-        yield start + (end - start) * share
 
 
 def _stays(plan: MotionPlan, going: Travelled, offset: Floats | None) -> Travelled:

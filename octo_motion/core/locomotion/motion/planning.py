@@ -7,7 +7,7 @@ import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from ..ground import (
     Carpet,
     ContactOverride,
     GroundedWalk,
+    GroundMesh,
     HeightField,
     Unrolled,
     roll_out,
@@ -76,7 +77,7 @@ from .job import (
     Timing,
     Tolerances,
 )
-from .segments import Gait, Nearby, Segments, Standing, Transitions, stand
+from .segments import Gait, Nearby, Segments, Standing, Transitions, standing_on
 
 _posers: Final[ContentCache[GaitPoser]] = ContentCache(12)
 
@@ -317,6 +318,21 @@ def schedule(job: MotionJob) -> Schedule:
     return Schedule(route, travel, frames, times, seconds, head, lean)
 
 
+_Outcome = TypeVar("_Outcome")
+
+
+def scaled(
+    steps: Generator[float, None, _Outcome], start: float, end: float
+) -> Generator[float, None, _Outcome]:
+    """Steps that are a part of the whole work, from one share of it to another."""
+    while True:
+        try:
+            share = next(steps)
+        except StopIteration as last:
+            return last.value
+        yield start + (end - start) * share
+
+
 def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     """Plan a motion, in steps that yield the share that is done.
 
@@ -327,16 +343,16 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     yield 0.0
     when = schedule(job)
     route, lean = when.route, when.lean
-    plane = None
-    if isinstance(job.changes, ChangesByHeight):
-        plane = float(route.position(np.linspace(0.0, 1.0, _ROUTE_SAMPLES))[:, 2].min())
+    plane = _lowest(route) if isinstance(job.changes, ChangesByHeight) else None
     changes = bool(job.changes) and not job.in_place
     gaits: list[Gait] = []
     for number, each in enumerate(job.gaits if changes else job.gaits[:1]):
         poser = _poser(job, each, lean)
         yield 0.5 * (number + 0.2) / len(job.gaits)
-        gaits.append(_gait(job, each, poser, route, lean=lean, plane=plane))
-        yield 0.5 * (number + 1) / len(job.gaits)
+        making = _making_gait(job, each, poser, route, lean=lean, plane=plane)
+        start, end = (0.5 * (number + share) / len(job.gaits) for share in (0.2, 1.0))
+        gaits.append((yield from scaled(making, start, end)))
+        yield end
     overrides = job.ground.overrides if job.ground is not None else ()
     standing = gaits[0].standing
     if changes:
@@ -379,6 +395,11 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     return plan
 
 
+def _lowest(route: Route) -> float:
+    """World Z of the lowest place of a route."""
+    return float(route.position(np.linspace(0.0, 1.0, _ROUTE_SAMPLES))[:, 2].min())
+
+
 def plan_near(
     job: MotionJob, known: MotionPlan, first: float, last: float, *, anew: bool = False
 ) -> Generator[float, None, tuple[MotionPlan, slice]]:
@@ -403,7 +424,9 @@ def plan_near(
         rough = _rough_poser(known.job, known.schedule.lean, anew=True)
         poser = poser.corrected(rough, known.first.poser)
         yield 0.5
-    moving = _gait(job, gait, poser, when.route, lean=when.lean, plane=None, near=near)
+    moving = yield from _making_gait(
+        job, gait, poser, when.route, lean=when.lean, plane=None, near=near
+    )
     yield 0.7
     walk, standing = None, moving.standing
     if standing is not None:
@@ -424,7 +447,7 @@ def _along(
         return carry
     if not isinstance(standing.ground, HeightField):
         return carry
-    faces = ground.mesh[0]
+    faces = ground.mesh.triangles
     source = np.arange(len(faces)) if source is None else source
     carpet = Carpet.of(ground.moving, standing.ground, faces, source)
     reach = reach_of(job.creature)
@@ -438,21 +461,21 @@ def _planned(job: MotionJob) -> tuple[MotionJob, Carry | None, np.ndarray | None
     ground, route = job.ground, job.route
     if ground is None or ground.mesh is None or route is None or ground.stance.up == "WORLD":
         return job, None, None
-    triangles, content = ground.mesh
+    mesh = ground.mesh
     reach, always = reach_of(job.creature), ground.stance.up == "GROUND"
     beyond = max(each.travel.stride for each in job.gaits) * reach + reach
     sizes = reach, beyond, always
 
     def made() -> tuple[Unrolled, Floats, np.ndarray] | None:
-        space = roll_out(route, triangles, reach=reach, beyond=beyond, always=always)
-        return None if space is None else (space, *space.faces(triangles))
+        space = roll_out(route, mesh.triangles, reach=reach, beyond=beyond, always=always)
+        return None if space is None else (space, *space.faces(mesh.triangles))
 
-    key = content_key(content, route.controls, route.breaks, route.cyclic, *sizes)
+    key = content_key(mesh.content, route.controls, route.breaks, route.cyclic, *sizes)
     if (found := _unrolled_known.get(key, made)) is None:
         return job, None, None
     space, faces, source = found
     overrides = tuple(_in_plan(each, space) for each in ground.overrides)
-    ground = replace(ground, mesh=(faces, key), overrides=overrides)
+    ground = replace(ground, mesh=GroundMesh(key, lambda: faces), overrides=overrides)
     return replace(job, route=space.route(route), ground=ground), Carry(space, reach), source
 
 
@@ -544,7 +567,7 @@ def _travel(job: MotionJob, gait: GaitJob, lean: float) -> TravelSettings:
     return travel_in_place(travel) if job.in_place else travel
 
 
-def _gait(
+def _making_gait(
     job: MotionJob,
     gait: GaitJob,
     poser: GaitPoser,
@@ -553,11 +576,11 @@ def _gait(
     lean: float,
     plane: float | None,
     near: Nearby | None = None,
-) -> Gait:
-    """One way of moving along this route, all of it or near one place."""
+) -> Generator[float, None, Gait]:
+    """One way of moving along this route, all of it or near one place, in steps."""
     table, travel, standing = gait.settings.gait, _travel(job, gait, lean), None
     if table.on_ground and job.ground is not None:
-        standing = stand(
+        standing = yield from standing_on(
             job.creature,
             poser,
             job.ground,

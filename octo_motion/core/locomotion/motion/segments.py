@@ -198,17 +198,25 @@ class Nearby:
         near_end = min(self.start, length - self.end) < _RESTED_STRIDES * stride
         return job if near_end else replace(job, rest=(False, False))
 
-    def same_ground(self, job: GroundJob, route: Route, reach: float) -> bool:
-        """Whether its ground is as good for another walk: the same that was sampled as widely."""
+    def same_ground(
+        self, job: GroundJob, route: Route, reach: float
+    ) -> tuple[Ground, Ground] | None:
+        """Its ground, as it is and as arms feel it, where that is as good for another walk: the
+        same, or elsewhere, that was sampled as widely. None where it is not.
+        """
         here, there = self.standing.job.mesh, job.mesh
-        if here is None or there is None or here[1] != there[1]:
-            return False
+        shift = there.shift_from(here) if here is not None and there is not None else None
+        if shift is None:
+            return None
         share = np.linspace(0.0, 1.0, _LOOKS_ALONG)
-        apart = route.position(share) - self.standing.line.route.position(share)
-        return float(np.abs(apart).max()) < _ASIDE * reach
+        apart = route.position(share) - self.standing.line.route.position(share) - shift
+        if float(np.abs(apart).max()) >= _ASIDE * reach:
+            return None
+        known = self.standing.ground, self.standing.underfoot
+        return (known[0].moved(shift), known[1].moved(shift)) if shift.any() else known
 
 
-def stand(
+def standing_on(
     creature: Creature,
     poser: GaitPoser,
     job: GroundJob,
@@ -219,8 +227,8 @@ def stand(
     plane: float | None = None,
     cyclic: bool = False,
     near: Nearby | None = None,
-) -> Standing:
-    """Find the ground under a walk, its height over it, and when its arms hold on.
+) -> Generator[float, None, Standing]:
+    """A walk's ground, its height over it, and when its arms hold on; in steps.
 
     Args:
         creature: whose walk it is.
@@ -238,14 +246,11 @@ def stand(
     """
     bearings, scale = bearings_of(route, travel, coarse=near is not None), creature.scale
     reach, phases = poser.arm_length * scale, (0.0, CYCLE * strides(route, travel))
-    (ground, underfoot), warnings = _ground(
+    (ground, underfoot), warnings = yield from _finding_ground(
         job, route, travel, bearings, reach=reach, plane=plane, cyclic=cyclic, near=near
     )
     line = body_line(
-        route,
-        travel,
-        bearings,
-        ground,
+        *(route, travel, bearings, ground),
         clearance=_height(poser, job) * scale if height is None else height,
         reach=reach,
         lean=job.stance.lean,
@@ -335,7 +340,7 @@ def _within_reach(
     return min(heights)
 
 
-def _ground(
+def _finding_ground(
     job: GroundJob,
     route: Route,
     travel: TravelSettings,
@@ -345,16 +350,16 @@ def _ground(
     plane: float | None,
     cyclic: bool,
     near: Nearby | None,
-) -> tuple[tuple[Ground, Ground], tuple[str, ...]]:
-    """The ground of a walk, as it is and as arms feel it, and what there is to warn of."""
+) -> Generator[float, None, tuple[tuple[Ground, Ground], tuple[str, ...]]]:
+    """The ground of a walk, as it is and as arms feel it, and what to warn of; in steps."""
     if cyclic:
         level = LevelGround(0.0)
         return (level, level), ()
     if job.mesh is None and plane is not None:
         level = LevelGround(plane)
         return (level, level), job.warnings
-    if near is not None and near.same_ground(job, route, reach):
-        return (near.standing.ground, near.standing.underfoot), job.warnings
+    if near is not None and (known := near.same_ground(job, route, reach)) is not None:
+        return known, job.warnings
     beyond = 0.0 if route.cyclic else travel.stride + reach
     start, end = (0.0, route.length) if near is None else near.around(travel.stride, route.length)
     count = int(np.ceil((end - start + 2.0 * beyond) / (_PATH_STEP * reach))) + 1
@@ -368,15 +373,18 @@ def _ground(
         ground = ground_along_path(path, reach=around, spacing=spacing, softness=0.3 * reach)
         return (ground, ground), warnings
     inside = (distance >= 0.0) & (distance <= route.length)
-    triangles, content = job.mesh
+    mesh = job.mesh
     sizes = {"reach": _AROUND * reach, "spacing": _FINE * reach, "headroom": _HEADROOM * reach}
     sizes["gap"] = _GAP * reach
-
-    def sampled() -> tuple[Ground, Ground]:
-        ground = sample_ground(triangles, path, inside, **sizes, content=content)
-        return ground, ground.rounded(_EDGE * reach)
-
-    found = _grounds.get(content_key(content, path, inside, sizes), sampled)
+    key = content_key(mesh.content, path, inside, sizes)
+    if (found := _grounds.known(key)) is None:
+        triangles = mesh.triangles
+        yield 0.1
+        sampled = sample_ground(triangles, path, inside, **sizes, content=mesh.content)
+        yield 0.4
+        made = sampled, sampled.rounded(_EDGE * reach)
+        found = _grounds.get(key, lambda: made)
+        yield 0.5
     told = _too_steep(found[0], path[inside], reach) if job.stance.up == "WORLD" else ()
     return found, (*told, *job.warnings)
 

@@ -69,6 +69,8 @@ SHORTEST: Final = 1e-6
 """Metres. A route below it is a point."""
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+_AT_ONCE: Final = 2048
+"""Places times nodes that are looked at together."""
 _FIRST_PIECES: Final = 4
 _DEEPEST: Final = 24
 _MOST_STEPS: Final = 100
@@ -307,16 +309,19 @@ class Route:
         """Metres from parameters ``start`` to ``end``, both within one piece, by Gauss–Legendre;
         with them comes the speed at the end, by which they grow with the parameter.
         """
+        shape, start, end = end.shape, start.reshape(-1), end.reshape(-1)
         half, middle = 0.5 * (end - start), 0.5 * (end + start)
         speed = self._speed_within(middle)
         # Summed node by node: a matrix product rounds differently for each number of rows.
-        total = np.zeros_like(half)
-        for node, weight in zip(_NODES, _WEIGHTS, strict=True):
-            total += weight * speed(middle + node * half)
-        return total * half, speed(end)
+        total, many = np.zeros_like(half), max(_AT_ONCE // max(len(half), 1), 1)
+        for first in range(0, len(_NODES), many):
+            nodes = _NODES[first : first + many, None]
+            for weight, each in zip(_WEIGHTS[first:], speed(middle + nodes * half), strict=False):
+                total += weight * each
+        return (total * half).reshape(shape), speed(end).reshape(shape)
 
     def _speed_within(self, middle: Floats) -> Callable[[Floats], Floats]:
-        """Speeds at parameters within the segments that the parameters ``middle`` lie in."""
+        """Speeds at parameters (…, n) within the segments of parameters ``middle`` (n,)."""
         if np.any(self.controls[..., 3] != 1.0):
             return lambda s: _norm(self.velocity(s))
         # Quadrature asks for little else: without weights, the derivative is a polynomial, whose
@@ -331,11 +336,11 @@ class Route:
         powers = [np.ascontiguousarray(each) for each in powers]
 
         def speed(s: Floats) -> Floats:
-            t = (s - start) / share
+            t = ((s - start) / share)[..., None, :]
             value = powers[0]
             for power in powers[1:]:
                 value = t * value + power
-            x, y, z = value
+            x, y, z = np.moveaxis(np.broadcast_to(value, (*s.shape[:-1], *value.shape[-2:])), -2, 0)
             return (degree + 1) / share * np.sqrt(x * x + y * y + z * z)
 
         return speed

@@ -26,6 +26,7 @@ from ....blender.scene import (
     is_carried,
     is_enabled,
     read_form,
+    read_ground_mesh,
     read_motion,
     read_places,
     read_triangles,
@@ -36,7 +37,7 @@ from ....core.follow_through import limbs_of
 from ....core.keyframes import check_bounds
 from ....core.locomotion.body import BodySettings, Organs, find_organs
 from ....core.locomotion.gait import GaitSettings, GaitTable
-from ....core.locomotion.ground import MovingMesh, StanceSettings
+from ....core.locomotion.ground import GroundMesh, MovingMesh, StanceSettings
 from ....core.locomotion.motion import (
     BodyJob,
     Breathing,
@@ -363,7 +364,7 @@ def read_ground(
         return None
     mesh, warnings = None, list[str]()
     if ground.object is not None and settings.travel_on != "NONE":
-        mesh = same_mesh.mesh if same_mesh is not None else read_triangles(ground.object, depsgraph)
+        mesh = same_mesh.mesh if same_mesh else read_ground_mesh(ground.object, depsgraph)
         if len(ground.object.modifiers) > 0 and not is_enabled(ground.object, depsgraph):
             warnings.append(phrase(_BARE, name=ground.object.name))
     by_moving = creature.channels.moved is not None
@@ -398,8 +399,8 @@ def read_moving(
     if (read := read_motion(obj, frames)) is None:
         return ground
     moving = MovingMesh(frames, *read)
-    triangles = moving.triangles
-    return replace(ground, mesh=(triangles, content_key(triangles)), moving=moving)
+    mesh = GroundMesh(content_key(moving.triangles), lambda: moving.triangles)
+    return replace(ground, mesh=mesh, moving=moving)
 
 
 def read_floor(

@@ -14,7 +14,7 @@ from ....blender.animation import (
     LENGTH,
     HalfWritten,
     PropertyValues,
-    animated_bones,
+    curves_of,
     looking_whether_edited,
     show_values,
     shown_values,
@@ -148,10 +148,8 @@ class Following:
         if self.shown.moved is None:
             previous = previous_action(armature, locomotion_settings(armature))
             paths = {path for path in self.shown.before if path.endswith(LENGTH)}
-            for kind in LENGTH:
-                bones = animated_bones(previous, (kind,)) if previous is not None else set[str]()
-                names = map(bpy.utils.escape_identifier, bones)
-                paths |= {f'pose.bones["{name}"].{kind}' for name in names}
+            curves = curves_of(previous) if previous is not None else ()
+            paths |= {path for each in curves if (path := each.data_path).endswith(LENGTH)}
             own = {bone for arm in self.shot.job.creature.bones for bone in arm}
             self.shown.moved = {path for path in paths if bone_and_property(path)[0] in own}
         return self.shown.moved
