@@ -166,7 +166,7 @@ def live_drag(hand: Hand, figures: Figures) -> Steps:
                 shown = now
                 latencies.append(hand.draws[-1] - moved)
                 break
-    lasted = time.perf_counter() - begun
+    lasted, drawn = time.perf_counter() - begun, len(hand.draws) - draws
     yield from hand.take("live_drag_1_held")
     hand.event("LEFTMOUSE", "PRESS")
     hand.event("LEFTMOUSE", "RELEASE")
@@ -191,7 +191,8 @@ def live_drag(hand: Hand, figures: Figures) -> Steps:
         "drags followed": f"{len(latencies)} of {drags}",
         "ms to the redraw": round(1e3 * latencies[len(latencies) // 2]),
         "slowest": round(1e3 * latencies[-1]),
-        "redraws a second": round((len(hand.draws) - draws) / lasted, 1),
+        "redraws a drag": round(drawn / drags, 1),
+        "redraws a second": round(drawn / lasted, 1),
         "ms longest turn after": round(1e3 * max(slices)),
     }
     yield from hand.take("live_drag_2_let_go")

@@ -24,10 +24,17 @@ _ROWS: Final = (
     ("Another set-up and its motion: clicks", "setup", "clicks"),
     ("Route dragged live: drags that the octopus followed", "live_drag", "drags followed"),
     ("milliseconds of the processor for each", "live_drag", "ms of processor a move"),
+    ("redraws for each", "live_drag", "redraws a drag"),
     ("redraws a second", "live_drag", "redraws a second"),
     ("Clip dropped: clicks", "drop", "clicks"),
+    ("seconds until it is there", "drop", "seconds"),
 )
 _SPOKEN: Final = {"en_US": "English", "ja_JP": "Japanese"}
+_DRAWN: Final = (
+    "Each drag is followed by drawing the viewport, which takes most of the time where a\n"
+    "processor draws in place of a graphics card, as it did here: the milliseconds of the\n"
+    "processor are Octo Motion's own work."
+)
 _MARKED: Final = re.compile(r"<!-- figures -->.*?<!-- end of figures -->", re.DOTALL)
 
 
@@ -46,7 +53,7 @@ def keep(folder: Path, language: str, run: dict[str, Any]) -> Path:
     size = "{}x{}".format(*one.size)
     width, height = sheet.size
     sheet.scale(_WIDTH, round(height * _WIDTH / width))
-    name = f"{language}_{size}"
+    name = _name({"language": language, "size": size})
     FOLDER.mkdir(parents=True, exist_ok=True)
     sheet.file_format = "JPEG"
     sheet.save(filepath=str(FOLDER / f"{name}.jpg"), quality=_QUALITY)
@@ -68,7 +75,9 @@ def runs() -> list[dict[str, Any]]:
 
 
 def block() -> str:
-    """What stands between the page's marks, marks included."""
+    """What stands between the page's marks, marks included: the table, where it was measured, and
+    the sheets.
+    """
     kept = runs()
     heads = [
         f"{_SPOKEN.get(each['language'], each['language'])}, {each['size'].replace('x', ' × ')}"
@@ -82,7 +91,17 @@ def block() -> str:
         f"- {head}: {told(each['run'])[:1].lower()}{told(each['run'])[1:]}"
         for head, each in zip(heads, kept, strict=True)
     )
-    return f"<!-- figures -->\n\n{table}\n\n{said}\n\n<!-- end of figures -->"
+    sheets = "\n\n".join(
+        f"## {head}\n\n![The first hour, {head}](images/first_hour/{_name(each)}.jpg)"
+        for head, each in zip(heads, kept, strict=True)
+    )
+    parts = table, said, _DRAWN, sheets
+    return "\n\n".join(["<!-- figures -->", *parts, "<!-- end of figures -->"])
+
+
+def _name(run: dict[str, Any]) -> str:
+    """What a run's files are called."""
+    return f"{run['language']}_{run['size']}"
 
 
 def filled(text: str) -> str:

@@ -838,11 +838,8 @@ def test_where_nothing_is_live_nobody_looks_at_what_moves(octopus: Any) -> None:
 
 def told_of_updates() -> list[Any]:
     """Those of ours whom Blender calls after each update and each frame."""
-    known = bpy.app.handlers
-    ours = {live._state.after_update, live._state.after_frame}
-    return [
-        each for each in (*known.depsgraph_update_post, *known.frame_change_post) if each in ours
-    ]
+    known = (*bpy.app.handlers.depsgraph_update_post, *bpy.app.handlers.frame_change_post)
+    return [each for each in known if each in {live._state.after_update, live._state.after_frame}]
 
 
 def test_where_nothing_is_live_blender_calls_nobody(octopus: Any, tmp_path: Path) -> None:
@@ -870,7 +867,8 @@ def test_what_is_appended_or_linked_live_is_followed(octopus: Any, tmp_path: Pat
     for link in (False, True):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         assert not told_of_updates()
-        with bpy.data.libraries.load(path, link=link) as (_, loaded):
+        opened: Any = bpy.data.libraries.load(path, link=link)
+        with opened as (_, loaded):
             loaded.objects = [name]
         found: Any = loaded.objects[0]
         bpy.context.scene.collection.objects.link(found)
