@@ -18,6 +18,7 @@ import pytest
 import octo_motion
 from octo_motion.blender.animation import actions
 from octo_motion.blender.scene.contact_markers import markers
+from octo_motion.core.locomotion.motion import segments
 from octo_motion.ui.live import stop_timer
 from octo_motion.ui.locomotion import panels
 from octo_motion.ui.locomotion.operators import generate as live
@@ -482,6 +483,53 @@ def test_a_slider_is_followed_nearly_at_once(octopus: Any, name: str, value: Any
     there = seen(octopus)
     far, nearly = (farthest(there, each) for each in (here, shown))
     print("NEARLY", name, far, nearly)
+    assert nearly < 0.03
+    assert far > 2.0 * nearly
+
+
+def bumps() -> Any:
+    """A mesh of 12 m with bumps of 0.1 m."""
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=60, y_subdivisions=60, size=12.0)
+    ground: Any = bpy.context.object
+    for each in ground.data.vertices:
+        each.co.z = 0.1 * np.sin(3.0 * each.co.x) * np.cos(2.5 * each.co.y)
+    return ground
+
+
+@pytest.mark.parametrize(
+    ("shift", "samples"), [((0.3, 0.1, 0.0), 0), ((0.0, 0.0, 0.2), 0), (None, 1), ((3.0, 0.0, 0.0), 1)]
+)
+def test_a_dragged_ground_is_seen_at_once_and_takes_its_samples_along(
+    octopus: Any,
+    shift: tuple[float, float, float] | None,
+    samples: int,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sampled: list[int] = []
+    sample = segments.sample_ground
+    monkeypatch.setattr(
+        segments, "sample_ground", lambda *a, **k: (sampled.append(1), sample(*a, **k))[1]
+    )
+    settings_of(octopus).frame_end = 160
+    bpy.context.scene.frame_set(80)
+    ground = settings_of(octopus).ground.object = bumps()
+    settle()
+    here = seen(octopus)
+    sampled.clear()
+    if shift is None:
+        ground.rotation_euler.z = 0.1
+    else:
+        ground.location = shift
+    bpy.context.view_layer.update()
+    live.run_pending()
+    # Turned, or farther away than is known of it, it is looked at anew.
+    assert len(sampled) == samples
+    shown = seen(octopus)
+    live.finish_following()
+    assert len(sampled) == samples + 1
+    there = seen(octopus)
+    far, nearly = (farthest(there, each) for each in (here, shown))
+    print("MOVED", shift, far, nearly)
     assert nearly < 0.03
     assert far > 2.0 * nearly
 
