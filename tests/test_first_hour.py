@@ -23,6 +23,10 @@ def test_the_first_hour_is_kept_in_both_languages_at_both_sizes() -> None:
         assert (kept.FOLDER / name).exists()
 
 
+def test_every_figure_was_counted_in_every_run() -> None:
+    assert kept._UNKNOWN not in kept.block()
+
+
 def test_a_first_walk_takes_three_clicks_and_no_wheel() -> None:
     for each in kept.runs():
         walk = each["steps"]["first_walk"]

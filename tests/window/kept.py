@@ -30,6 +30,8 @@ _ROWS: Final = (
     ("seconds until it is there", "drop", "seconds"),
 )
 _SPOKEN: Final = {"en_US": "English", "ja_JP": "Japanese"}
+_UNKNOWN: Final = "–"
+"""What stands in place of a figure that was not counted yet when a run was kept."""
 _DRAWN: Final = (
     "Each drag is followed by drawing the viewport, which takes most of the time where a\n"
     "processor draws in place of a graphics card, as it did here: the milliseconds of the\n"
@@ -85,7 +87,7 @@ def block() -> str:
     ]
     lines = [["", *heads], ["---"] * (len(kept) + 1)]
     for words, step, figure in _ROWS:
-        lines.append([words, *(str(each["steps"][step][figure]) for each in kept)])
+        lines.append([words, *(str(each["steps"][step].get(figure, _UNKNOWN)) for each in kept)])
     table = "\n".join(f"| {' | '.join(line)} |" for line in lines)
     said = "\n".join(
         f"- {head}: {told(each['run'])[:1].lower()}{told(each['run'])[1:]}"
