@@ -27,7 +27,7 @@ SOON: Final = 0.0
 """Seconds from a change to the frame in sight at least: what changes together is told together."""
 IDLE: Final = 0.1
 """Seconds without a change after which all other frames follow …"""
-TURN: Final = 0.004
+TURN: Final = 0.002
 """… and for how long at a time, before a step of the work that has begun is let end: it takes about
 as long again."""
 LATER: Final = 0.3

@@ -497,7 +497,8 @@ def bumps() -> Any:
 
 
 @pytest.mark.parametrize(
-    ("shift", "samples"), [((0.3, 0.1, 0.0), 0), ((0.0, 0.0, 0.2), 0), (None, 1), ((3.0, 0.0, 0.0), 1)]
+    ("shift", "samples"),
+    [((0.3, 0.1, 0.0), 0), ((0.0, 0.0, 0.2), 0), (None, 1), ((3.0, 0.0, 0.0), 1)],
 )
 def test_a_dragged_ground_is_seen_at_once_and_takes_its_samples_along(
     octopus: Any,
