@@ -477,6 +477,8 @@ class Live(_Following):
 
     @persistent
     def _before_loading(self, *_: object) -> None:
+        # Blender 4.5 as a module does not end where loading has taken a timer away.
+        stop_timer(self.end_watching)
         self.drop()
         self.clear()
 
