@@ -37,7 +37,9 @@ def known() -> set[str]:
 
 @pytest.fixture
 def all_of_it() -> Iterator[set[str]]:
-    """What Blender knows while the add-on is on; it is on again after the test."""
+    """What Blender knows as the add-on is switched on; it is on again after the test."""
+    octo_motion.unregister()
+    octo_motion.register()
     on = known()
     yield on
     octo_motion.unregister()

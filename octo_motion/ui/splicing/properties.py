@@ -436,9 +436,9 @@ class OCTO_MOTION_PG_retarget(bpy.types.PropertyGroup):
     )
     standing: _action(
         "Stands As in",
-        "An action of this armature that tells at which height it stands, and how it holds fingers, "
-        "hair and all else that no part takes; empty is found: the base of its splices, or an idle "
-        "action, or its own one. Otherwise it stands as it rests",
+        "An action of this armature that tells at which height it stands, and how it holds "
+        "fingers, hair and all else that no part takes; empty is found: the base of its splices, "
+        "or an idle action, or its own one. Otherwise it stands as it rests",
     )
     visual: _as_shown("As Shown", "clip")
     from_armature: props.PointerProperty(

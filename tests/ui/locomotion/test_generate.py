@@ -1072,7 +1072,7 @@ def test_a_failure_in_the_middle_cleans_up(
 ) -> None:
     operator, window = long_job
 
-    def fail(*_: object) -> None:
+    def fail(*_: object, **_options: object) -> None:
         raise ZeroDivisionError
 
     monkeypatch.setattr(GaitPoser, "shaping", fail)

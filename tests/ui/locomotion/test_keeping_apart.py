@@ -7,8 +7,8 @@ import bpy
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.clearance import arm_separation as body_volume
-from octo_motion.core.locomotion.clearance.arm_separation import DEEP
+from octo_motion.core.locomotion.clearance import corrections as body_volume
+from octo_motion.core.locomotion.clearance.corrections import DEEP
 from octo_motion.ui.locomotion.operators import generate as live
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from tests.bench.apart import add_bumps

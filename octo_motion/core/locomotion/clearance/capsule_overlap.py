@@ -13,12 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from itertools import pairwise
 from typing import Any, Final, TypeVar
 
 import numpy as np
 
 from ...content_cache import part_of
-from ...portions import portions
 from ...rotations import Floats
 from ...rotations.components_first import dot
 from ...smoothing import smooth_step
@@ -719,3 +719,12 @@ def aside(touches: Touches) -> tuple[Floats, Floats]:
     soft = _SOFT * touches.thin
     far = np.where(far > soft, far, np.maximum(far + soft, 0.0) ** 2 / (4.0 * soft))
     return way, told * far
+
+
+def portions(length: int, most: int) -> list[slice]:
+    """Slices of a row of that length that follow one another, of so many items at most each, and of
+    as many items each as the others: a portion at a time stays in the processor's cache.
+    """
+    count = -(-length // most)
+    ends = [length * number // count for number in range(count + 1)] if count else []
+    return [slice(start, end) for start, end in pairwise(ends)]

@@ -23,13 +23,12 @@ from typing import Final, Protocol
 import numpy as np
 
 from ...content_cache import part_of
-from ...portions import portions
 from ...rotations import Floats
 from ...rotations.components_first import dot
 from ...smoothing import blur_reach, blurred, covered, smooth_step, widened
 from ..ground import drawn
 from ..rig import TOLERATED, lowest_allowed
-from .capsule_overlap import Capsules, Crowd, Touches, Touching, all_of, aside
+from .capsule_overlap import Capsules, Crowd, Touches, Touching, all_of, aside, portions
 
 _DAMPED: Final = 0.02
 """Stiffness of a segment, in squares of its length …"""

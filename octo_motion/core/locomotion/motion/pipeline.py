@@ -20,13 +20,10 @@ from ..body import BodyMoments, OrganPoses, pose_organs
 from ..clearance import (
     ArmsOverGround,
     Opened,
-    eased_turns,
-    fastest_turn,
     keep_off_ground,
     lead_past,
     raise_between_frames,
     separating_arms,
-    where_it_helps,
 )
 from ..gait import CYCLE
 from ..ground import Ground, sample_ground
@@ -37,9 +34,12 @@ from ..rig import (
     MARGIN,
     ArmMotion,
     Poses,
+    eased_turns,
+    fastest_turn,
     halfway_automatic,
     object_transforms,
     root_bone_transforms,
+    where_it_helps,
 )
 from .carrying import Carry, carried
 from .few_keys import Motion, measuring_keyed, reduced
@@ -686,7 +686,7 @@ def _take_time(
     # Where it is no help, it is no good either.
     most = fastest_turn(rate, per_cycle)
     arms.rotations = where_it_helps(
-        frames, before, arms.rotations, going[1], most=most, every=every
+        *(frames, before, arms.rotations, going[1]), most=most, every=every, cyclic=cyclic
     )
 
 

@@ -46,6 +46,8 @@ from .poses import (
     ArmMotion,
     Poses,
     carried_by_root_bone,
+    eased_turns,
+    fastest_turn,
     find_mantle,
     halfway_automatic,
     halfway_linear,
@@ -53,6 +55,7 @@ from .poses import (
     object_transforms,
     root_bone_transforms,
     stretch_mantle,
+    where_it_helps,
 )
 
 __all__ = [
@@ -79,6 +82,8 @@ __all__ = [
     "carried_by_root_bone",
     "chain_of",
     "detect_arms",
+    "eased_turns",
+    "fastest_turn",
     "find_mantle",
     "frame_of",
     "frames_of_arm",
@@ -102,4 +107,5 @@ __all__ = [
     "sucker_sides",
     "transport_frames",
     "turns_in_world",
+    "where_it_helps",
 ]

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.clearance.over_ground import ArmsOverGround, raise_between_frames
+from octo_motion.core.locomotion.clearance.corrections import ArmsOverGround, raise_between_frames
 from octo_motion.core.locomotion.ground.walk import Raise
 from octo_motion.core.locomotion.rig.bone_rotations import frames_of_arm
 from octo_motion.core.locomotion.rig.poses import Poses, object_transforms

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.clearance.arm_separation import BodyVolume, separating_arms
 from octo_motion.core.locomotion.clearance.capsule_overlap import Capsules, measure_overlap
+from octo_motion.core.locomotion.clearance.corrections import BodyVolume, separating_arms
 from octo_motion.core.locomotion.rig.arm_chains import body_frame
 from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_arm
 from octo_motion.core.rotations import IDENTITY, Floats, from_axis_angle, multiply

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.clearance.over_ground import (
+from octo_motion.core.locomotion.clearance.corrections import (
     ArmsOverGround,
     afloat,
     keep_off_ground,

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.clearance.turn_easing import eased_turns, where_it_helps
 from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_arm
+from octo_motion.core.locomotion.rig.poses import eased_turns, where_it_helps
 from octo_motion.core.rotations import Floats, from_axis_angle
 from tests.core.rigs import body_with_arms
 
