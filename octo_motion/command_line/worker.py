@@ -21,6 +21,7 @@ from typing import Any, Final
 import bpy
 
 from ..core.errors import OctoMotionError, WriteError
+from ..core.processes import PROCESSES, processors
 from ..ui.locomotion import Summary
 from .command_line import COMMAND
 from .job_report import Cause, LimitError, digest, quality
@@ -94,7 +95,7 @@ def run_processes(
         while True:
             while len(running) < most and (task := next(waiting, None)) is not None:
                 try:
-                    running.append(_Running(task, _start(task), clock()))
+                    running.append(_Running(task, _start(task, most), clock()))
                 except OSError as error:
                     task.log.write_text(f"{task.command[0]}: {error}", encoding="utf-8")
                     yield Ended(task.name, 127, 0.0)
@@ -132,7 +133,7 @@ class _Running:
         return self.task.answer is not None and self.task.answer.exists()
 
 
-def _start(task: Task) -> subprocess.Popen[bytes]:
+def _start(task: Task, most: int) -> subprocess.Popen[bytes]:
     # In a group of their own, so that Ctrl-C in a terminal reaches this process alone, which then
     # ends them in order. The pipe tells them when this process is gone, see ``dying_with_parent``.
     with task.log.open("wb") as log:
@@ -141,7 +142,7 @@ def _start(task: Task) -> subprocess.Popen[bytes]:
             stdin=subprocess.PIPE,
             stdout=log,
             stderr=subprocess.STDOUT,
-            env=task.environment,
+            env={PROCESSES: str(max(1, processors() // most)), **task.environment},
             start_new_session=sys.platform != "win32",
             creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
         )
@@ -224,13 +225,6 @@ def _watched_pipe() -> Callable[[], bool] | None:
             return False
 
     return is_held
-
-
-def processors() -> int:
-    """Processors that this process may use."""
-    if sys.platform == "linux":
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def last_lines(log: Path) -> str:

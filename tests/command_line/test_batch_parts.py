@@ -35,12 +35,12 @@ from octo_motion.command_line.worker import (
     Task,
     check_jobs,
     last_lines,
-    processors,
     run_processes,
 )
 from octo_motion.core.errors import OctoMotionError, SettingsError, WriteError
 from octo_motion.core.locomotion.gait.table import gait_presets
 from octo_motion.core.locomotion.metrics.report import Figure
+from octo_motion.core.processes import processors
 
 # --- What is skipped -----------------------------------------------------------------------------
 

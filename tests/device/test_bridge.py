@@ -19,6 +19,7 @@ import pytest
 
 from octo_motion.core.errors import DeviceError
 from octo_motion.core.posing.solver.obstacle_shapes import Plane
+from octo_motion.core.processes.python import LAUNCHER, library_folders
 from octo_motion.device import __main__ as program
 from octo_motion.device import messages as say
 from octo_motion.device.ipc import process
@@ -166,7 +167,7 @@ def test_killed_process_at_the_devices_is_started_again() -> None:
 def test_stranger_at_the_bridges_door_changes_nothing(tmp_path: Path) -> None:
     """Whoever finds the port and does not know the secret is sent away; no file is written."""
     with subprocess.Popen(
-        [process.python_executable(), "-I", process.LAUNCHER, "bridge", *OPTIONS],
+        [process.python_executable(), "-I", LAUNCHER, process.PROGRAM, "bridge", *OPTIONS],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -229,9 +230,9 @@ def test_program_runs_from_where_blender_installs_it(tmp_path: Path) -> None:
     skipped = shutil.ignore_patterns("__pycache__", "presets", "ui", "blender", "splicing")
     shutil.copytree(REPOSITORY / "octo_motion", installed, ignore=skipped)
     write(installed.parent / "json" / "__init__.py", "raise SystemExit('the wrong json')")
-    launcher = process.LAUNCHER.relative_to(REPOSITORY / "octo_motion")
+    launcher = LAUNCHER.relative_to(REPOSITORY / "octo_motion")
     run = subprocess.run(
-        [process.python_executable(), "-I", installed / launcher, "descriptor"],
+        [process.python_executable(), "-I", installed / launcher, process.PROGRAM, "descriptor"],
         capture_output=True,
         encoding="utf-8",
         check=True,
@@ -242,14 +243,15 @@ def test_program_runs_from_where_blender_installs_it(tmp_path: Path) -> None:
 def test_libraries_that_came_with_the_extension_are_handed_over(tmp_path: Path) -> None:
     write(tmp_path / "octo_test_library.py", "")
     script = (
-        "import sys, runpy; sys.argv = ['launch.py', '--library', sys.argv[1], 'descriptor']\n"
-        f"try: runpy.run_path({str(process.LAUNCHER)!r}, run_name='__main__')\n"
+        "import sys, runpy\n"
+        f"sys.argv = ['launch.py', {process.PROGRAM!r}, '--library', sys.argv[1], 'descriptor']\n"
+        f"try: runpy.run_path({str(LAUNCHER)!r}, run_name='__main__')\n"
         "except SystemExit: pass\n"
         "import octo_test_library"
     )
     run = subprocess.run([sys.executable, "-c", script, tmp_path], check=False)
     assert run.returncode == 0
-    assert any((Path(each) / "numpy").is_dir() for each in process.library_folders())
+    assert any((Path(each) / "numpy").is_dir() for each in library_folders())
 
 
 # --- The command line ----------------------------------------------------------------------------
@@ -260,7 +262,7 @@ def test_libraries_that_came_with_the_extension_are_handed_over(tmp_path: Path) 
 def test_program_without_blender_ends_without_a_riddle(command: str, said: str) -> None:
     """Blender killed in the moment of starting it, or a person who tries it out."""
     ended = subprocess.run(
-        [sys.executable, str(process.LAUNCHER), command],
+        [sys.executable, str(LAUNCHER), process.PROGRAM, command],
         input=said,
         capture_output=True,
         encoding="utf-8",

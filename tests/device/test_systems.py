@@ -15,6 +15,8 @@ from typing import Any
 import pytest
 
 from octo_motion.core.errors import DeviceError
+from octo_motion.core.processes import python as own_python
+from octo_motion.core.processes.python import LAUNCHER
 from octo_motion.device.haptics import schedule
 from octo_motion.device.hid import system
 from octo_motion.device.ipc import process
@@ -43,7 +45,7 @@ def started(monkeypatch: pytest.MonkeyPatch) -> None:
     def start(command: list[str], **options: Any) -> None:
         raise Started(command, options)
 
-    monkeypatch.setattr(process.subprocess, "Popen", start)
+    monkeypatch.setattr(own_python.subprocess, "Popen", start)
 
 
 @pytest.mark.usefixtures("started")
@@ -64,7 +66,7 @@ def test_blenders_python_finds_the_c_runtime_that_blender_brings(tmp_path: Path)
 
 
 def test_launcher_takes_the_folder_of_libraries_and_no_program_sees_it(tmp_path: Path) -> None:
-    command = [sys.executable, "-I", process.LAUNCHER, "descriptor", "--dlls", tmp_path]
+    command = [sys.executable, "-I", LAUNCHER, process.PROGRAM, "descriptor", "--dlls", tmp_path]
     run = subprocess.run(command, capture_output=True, encoding="utf-8", check=False)
     assert run.returncode == 0, run.stderr
     assert run.stdout.startswith("0x06")

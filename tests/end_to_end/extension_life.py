@@ -57,7 +57,7 @@ def start_bridge() -> Iterator[str]:
     """Start the installed extension's bridge; what it says, and the extension's own libraries."""
     # The Python of these tests may have another hidapi, which Blender's would not.
     sys.path.sort(key=lambda path: ".local" not in path)
-    process = importlib.import_module(f"{NAME}.device.ipc.process")
+    python = importlib.import_module(f"{NAME}.core.processes.python")
     client = importlib.import_module(f"{NAME}.device.ipc.client").Client()
     client.start(("--simulate", "--no-haply"))
     end = time.monotonic() + 60.0
@@ -71,7 +71,7 @@ def start_bridge() -> Iterator[str]:
     yield "bridge"
     yield from (str(each.name).replace(" ", "-") for each in client.devices.values())
     yield "hidapi-missing" if any("hidapi" in each.problem for each in client.notices) else "hidapi"
-    yield from (path for path in process.library_folders() if "extensions" in path)
+    yield from (path for path in python.library_folders() if "extensions" in path)
     client.stop()
 
 

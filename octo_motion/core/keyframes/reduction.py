@@ -14,19 +14,20 @@ between frames, too. Keys on every frame have handles of their own (:mod:`.dense
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from ..errors import SettingsError
+from ..processes import computed_apart, helpers
 from ..rotations import Floats
 from ..steps import finished
 from .channels import BezierKeys, Booleans
 from .dense import dense_keys
 from .key_times import Choice
-from .stretches import searched
+from .stretches import Found, Part, parts, searched, searching, together
 from .tracks import LOCATION, SCALE, Limb, Track, looked_at
 
 _SLACK: Final = 1.15
@@ -38,6 +39,9 @@ _HELD_LEVERAGE: Final = 4.2
 """… and the same of joints that rest."""
 _CHOOSING: Final = 0.2
 """Share of the work that it takes to choose key frames."""
+_LONG: Final = 100_000
+"""Values (a channel's at a frame) from which on processes of their own are worth their start: they
+take about 3 s of one processor, the start of a Python with numpy 0.3 s."""
 
 
 def check_bounds(angle: float, distance: float) -> None:
@@ -100,21 +104,68 @@ def reducing(
     plans = [_Plan.of(limb, len(times)) for limb in limbs]
     for share in _choose(times, plans, every):
         yield _CHOOSING * share
-    result: list[list[BezierKeys]] = []
-    done, whole = 0, max(sum(len(limb.tracks) for limb in limbs), 1)
-    for plan in plans:
-        fine = looked_at(times, plan.limb, every)
-        own = len(plan.limb.tracks)
-        steps = searched(fine, fine.marked(plan.keyed), fine.marked(plan.corners), loops=loops)
+    batch = _Batch(times, plans, every, loops=loops)
+    count = helpers() if batch.size >= _LONG else 0
+    steps = batch.searched_apart(count) if count else batch.searched_here()
+    while True:
+        try:
+            yield _CHOOSING + (1.0 - _CHOOSING) * next(steps)
+        except StopIteration as last:
+            return batch.together(last.value)
+
+
+class _Batch:
+    """The stretches of all limbs, whose keys are searched for one by one or some at a time."""
+
+    def __init__(self, times: Floats, plans: Sequence[_Plan], every: int, *, loops: bool) -> None:
+        self._times, self._plans, self._every, self._loops = times, plans, every, loops
+        tracks = sum(len(plan.limb.tracks) for plan in plans)
+        self.size = len(times) * tracks
+        """How many values there are to be fitted."""
+        self._whole = max(self.size, 1)
+        self._owners: list[int] = []
+        self._shares = [0.0]
+
+    def _parts(self) -> Iterator[Part]:
+        """One after the other, as they are needed, with note of how far that takes the work."""
+        for number, plan in enumerate(self._plans):
+            fine = looked_at(self._times, plan.limb, self._every)
+            share = len(self._times) / len(fine.times) / self._whole
+            marks = fine.marked(plan.keyed), fine.marked(plan.corners)
+            for part in parts(fine, *marks, loops=self._loops):
+                self._owners.append(number)
+                self._shares.append(self._shares[-1] + share * part.corners.size)
+                yield part
+
+    def searched_here(self) -> Generator[float, None, list[Found]]:
+        """The keys of each stretch, yielding the share that is done."""
+        found: list[Found] = []
+        for part in self._parts():
+            before, after = self._shares[-2:]
+            steps = searching(part)
+            while True:
+                try:
+                    yield before + (after - before) * next(steps)
+                except StopIteration as last:
+                    found.append(last.value)
+                    break
+        return found
+
+    def searched_apart(self, count: int) -> Generator[float, None, list[Found]]:
+        """The same, by so many processes."""
+        steps = computed_apart(searched, self._parts(), count)
         while True:
             try:
-                share = next(steps)
+                yield self._shares[next(steps)]
             except StopIteration as last:
-                result.append(last.value)
-                break
-            yield _CHOOSING + (1.0 - _CHOOSING) * (done + own * share) / whole
-        done += own
-    return result
+                return last.value
+
+    def together(self, found: Sequence[Found]) -> list[list[BezierKeys]]:
+        """The keys of each limb's tracks."""
+        by_limb: list[list[Found]] = [[] for _ in self._plans]
+        for owner, each in zip(self._owners, found, strict=True):
+            by_limb[owner].append(each)
+        return [together(each) for each in by_limb]
 
 
 def _dense(

@@ -9,13 +9,15 @@ has nothing to do with the other, and yet both go on in one line.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
 from ..rotations import Floats
+from ..steps import finished
 from .channels import BezierKeys, Booleans
 from .residuals import LinearModel
 from .search import Ends, Search
@@ -31,15 +33,36 @@ _SEAM: Final = 3
 """Frames on either side of a loop's seam that say whether it has a corner."""
 
 
-def searched(
-    fine: Fine, keyed: Booleans, corners: Booleans, *, loops: bool = False
-) -> Generator[float, None, list[BezierKeys]]:
-    """The keys of each track of a limb, in steps that yield the share that is done; what is given
-    is as :class:`search.Search` has it.
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One stretch of a limb's shot, with what is given to begin with as :class:`search.Search` has
+    it.
+    """
+
+    fine: Fine
+    keyed: Booleans
+    corners: Booleans
+    loops: bool = False
+    ends: Ends | None = None
+
+    @property
+    def work(self) -> int:
+        """How much there is to do, in values that change from moment to moment."""
+        return self.corners.size
+
+
+Found = tuple[list[BezierKeys], Booleans]
+"""The keys of each track, and which of the slopes at both ends (tracks, 2) they keep."""
+
+
+def parts(fine: Fine, keyed: Booleans, corners: Booleans, *, loops: bool = False) -> Iterator[Part]:
+    """The stretches of a limb's shot, one after the other; what is given is as
+    :class:`search.Search` has it.
     """
     cuts = _cuts(fine, keyed)
     if len(cuts) == 2:
-        return (yield from Search(fine, keyed, corners, loops=loops).found())
+        yield Part(fine, keyed, corners, loops=loops)
+        return
     held = ~corners[:, cuts]
     held[:, [0, -1]] = False
     slopes = _slopes(fine, cuts)
@@ -47,29 +70,33 @@ def searched(
         held[:, [0, -1]] = ~_turned_at_the_seam(fine)[:, None]
     keyed = keyed.copy()
     keyed[:, cuts] = True
-    found: list[list[BezierKeys]] = []
-    kept: list[Booleans] = []
     for number, (first, last) in enumerate(pairwise(cuts)):
         at, ends = slice(first, last + 1), slice(number, number + 2)
-        search = Search(
-            fine.between(first, last),
-            keyed[:, at],
-            corners[:, at],
-            ends=Ends(held[:, ends], slopes[..., ends]),
-        )
-        steps = search.found()
-        while True:
-            try:
-                share = next(steps)
-            except StopIteration as finished:
-                found.append(finished.value)
-                kept.append(search.held)
-                break
-            yield float((first + share * (last - first)) / cuts[-1])
+        own = Ends(held[:, ends], slopes[..., ends])
+        yield Part(fine.between(first, last), keyed[:, at], corners[:, at], ends=own)
+
+
+def searching(part: Part) -> Generator[float, None, Found]:
+    """The keys of one stretch, in steps that yield the share that is done."""
+    search = Search(part.fine, part.keyed, part.corners, loops=part.loops, ends=part.ends)
+    keys = yield from search.found()
+    return keys, search.held
+
+
+def searched(part: Part) -> Found:
+    """The same at once."""
+    return finished(searching(part))
+
+
+def together(found: Sequence[Found]) -> list[BezierKeys]:
+    """The keys of each track of a limb, from those of its stretches."""
+    (keys, _), *more = found
+    if not more:
+        return keys
+    kept = [held for _, held in found]
     smooth = np.stack([before[:, 1] & after[:, 0] for before, after in pairwise(kept)])
-    return [
-        _joined(parts, own) for parts, own in zip(zip(*found, strict=True), smooth.T, strict=True)
-    ]
+    tracks = zip(*(keys for keys, _ in found), strict=True)
+    return [_joined(own, at) for own, at in zip(tracks, smooth.T, strict=True)]
 
 
 def _cuts(fine: Fine, keyed: Booleans) -> Integers:

@@ -12,8 +12,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import hmac
-import importlib.util
-import itertools
 import logging
 import os
 import secrets
@@ -29,6 +27,7 @@ from typing import BinaryIO, Final, NoReturn
 
 from ...core.errors import DeviceError
 from ...core.phrases import phrase
+from ...core.processes import python_path, start_program
 from ..messages import (
     HEADER,
     MAGIC,
@@ -235,47 +234,27 @@ def _receive(connection: socket.socket, count: int) -> bytes:
 # --- Starting, and ending with whoever started us -------------------------------------------------
 
 _START_SECONDS: Final = 20.0
-LAUNCHER: Final = Path(__file__).with_name("launch.py")
+PROGRAM: Final = "octo_motion.device.__main__"
+"""As the launcher calls it, whatever Blender calls the package."""
 PORT_LINE: Final = "port "
 
 
 def python_executable() -> Path:
-    """The Python to run the bridge with: Blender's own, of the same version as this one.
-
-    Within Blender ``sys.executable`` is the Python that Blender brings; in some builds it is
-    Blender itself, or empty. Then Python lies below ``sys.prefix``.
+    """The Python to run the bridge with.
 
     Raises:
         DeviceError: none was found.
     """
-    major, minor, *_ = sys.version_info
-    names: tuple[str, ...] = (f"python{major}.{minor}", "python3", "python")
-    if os.name == "nt":
-        names = ("python.exe",)
-    prefixes = dict.fromkeys((sys.prefix, sys.base_prefix, sys.exec_prefix))
-    below = (Path(*each) for each in itertools.product(prefixes, ("bin", "."), names))
-    for path in (Path(sys.executable or "."), *below):
-        if path.name.lower().startswith("python") and path.is_file() and os.access(path, os.X_OK):
-            return path
-    raise DeviceError(
-        "Blender's own Python was not found, so devices cannot be used.",
-        phrase(
-            "Use a Blender from blender.org, which has its Python below {prefix}.",
-            prefix=sys.prefix,
-        ),
-    )
-
-
-def library_folders() -> list[str]:
-    """Where this Python has numpy and hidapi; the extension's wheels have a folder of their own."""
-    folders: dict[str, None] = {}
-    for name in ("numpy", "hid", "hidraw"):
-        with contextlib.suppress(ImportError, ValueError):
-            specification = importlib.util.find_spec(name)
-            if specification is not None and specification.origin:
-                origin = Path(specification.origin).parent
-                folders[str(origin.parent if name == "numpy" else origin)] = None
-    return list(folders)
+    path = python_path()
+    if path is None:
+        raise DeviceError(
+            "Blender's own Python was not found, so devices cannot be used.",
+            phrase(
+                "Use a Blender from blender.org, which has its Python below {prefix}.",
+                prefix=sys.prefix,
+            ),
+        )
+    return path
 
 
 class Child:
@@ -297,24 +276,10 @@ class Child:
             DeviceError: it does not start, or does not answer.
         """
         secret = new_secret()
-        options = ("-I", "-X", "utf8", str(LAUNCHER), *arguments)
         python = python or python_executable()
-        command = [str(python), *options]
-        for folder in library_folders():
-            command += ["--library", folder]
-        runtime = runtime_folder(python)
-        if runtime is not None:
-            command += ["--dlls", str(runtime)]
         try:
             with _messages_to(log_file) as messages:
-                process = subprocess.Popen(  # noqa: S603 - our own program
-                    command,
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                    stderr=messages,
-                    env=_environment(runtime),
-                    creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
-                )
+                process = start_program(python, PROGRAM, arguments, messages=messages)
         except OSError as error:
             raise DeviceError(
                 phrase("The device's program does not start: {strerror}.", strerror=error.strerror),
@@ -377,20 +342,6 @@ class Starting:
             self._dropped = True
         if self.child is not None:
             self.child.stop()
-
-
-def runtime_folder(python: Path) -> Path | None:
-    """Where Blender for Windows has Microsoft's C runtime: its Python alone does not find it."""
-    for folder in python.parents[:5]:
-        if (folder / "blender.crt").is_dir():
-            return folder / "blender.crt"
-    return None
-
-
-def _environment(runtime: Path | None) -> dict[str, str] | None:
-    if runtime is None:
-        return None
-    return {**os.environ, "PATH": f"{runtime}{os.pathsep}{os.environ.get('PATH', '')}"}
 
 
 @contextlib.contextmanager

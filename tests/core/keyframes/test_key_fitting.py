@@ -14,7 +14,7 @@ from octo_motion.core.keyframes.channels import values_at
 from octo_motion.core.keyframes.curves import Curves
 from octo_motion.core.keyframes.residuals import LinearModel, Residuals
 from octo_motion.core.keyframes.search import Search
-from octo_motion.core.keyframes.stretches import searched
+from octo_motion.core.keyframes.stretches import parts, searched
 from octo_motion.core.keyframes.tracks import SCALE, Fine, Limb, Track, looked_at, with_halves
 from octo_motion.core.rotations import (
     Floats,
@@ -287,7 +287,8 @@ def test_what_hardly_moves_is_not_cut_however_long_it_is() -> None:
     keyed = np.zeros((1, 3000), dtype=bool)
     keyed[:, [0, 700, 1500, 2200, -1]] = True
     corners = np.zeros((1, 3000), dtype=bool)
-    (keys,) = finished(searched(fine, keyed, corners))
+    (part,) = parts(fine, keyed, corners)
+    (keys,), _ = searched(part)
     (whole,) = finished(Search(fine, keyed, corners).found())
     np.testing.assert_array_equal(keys.frames, whole.frames)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Start the device's program from its file, wherever Blender has put the extension.
+"""Start a program of ours from its file, wherever Blender has put the extension.
 
 Installed, the package is called ``bl_ext.….octo_motion``, a name that exists within Blender alone,
 and its folder lies beside other extensions, which must not become importable. So this file, run by
@@ -30,12 +30,12 @@ def load() -> None:
 
 
 def main() -> int:
-    """Run ``python -m octo_motion.device`` without a search path for it.
+    """Run the ``main`` of a module of ours, the first argument, with the arguments after it.
 
     ``--library FOLDER``, as often as needed, says where numpy and hidapi are, ``--dlls FOLDER``
     where Windows finds libraries that they need.
     """
-    arguments = sys.argv[1:]
+    module, *arguments = sys.argv[1:]
     if "--dlls" in arguments:
         at = arguments.index("--dlls")
         if sys.platform == "win32":
@@ -46,7 +46,7 @@ def main() -> int:
         sys.path.extend(folder for folder in arguments[at + 1 : at + 2] if folder not in sys.path)
         del arguments[at : at + 2]
     load()
-    return importlib.import_module("octo_motion.device.__main__").main(arguments)
+    return importlib.import_module(module).main(arguments)
 
 
 if __name__ == "__main__":
