@@ -44,7 +44,7 @@ _APART: Final = {
 }
 """First words, and the modules that they run."""
 _SHORT: Final = ("comparison",)
-_USUAL: Final = ("comparison", "default", "frames", "arms", "live", "splices")
+_USUAL: Final = ("comparison", "default", "frames", "few", "arms", "live", "splices")
 
 
 def main() -> None:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import importlib
 import json
+import os
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -41,6 +42,8 @@ class Case:
     gait: str = "walk"
     look: bool = True
     """Whether to look at how good the motion is, which takes longer than making it."""
+    few: bool = False
+    """Whether with *Few* keys; of *default* alone."""
 
 
 @dataclass
@@ -58,7 +61,7 @@ class Result:
     """Seconds by what they were spent on."""
 
 
-def measure(case: Case) -> Measured:
+def measure(case: Case, environment: Mapping[str, str] | None = None) -> Measured:
     """Run a case in a process of its own; what ``Result`` has.
 
     Raises:
@@ -70,6 +73,7 @@ def measure(case: Case) -> Measured:
             [sys.executable, "-m", "tests.bench.case", str(path), json.dumps(asdict(case))],
             capture_output=True,
             encoding="utf-8",
+            env={**os.environ, **(environment or {})},
             check=False,
         )
         if finished.returncode != 0 or not path.exists():
@@ -77,9 +81,9 @@ def measure(case: Case) -> Measured:
         return json.loads(path.read_text(encoding="utf-8"))
 
 
-def fastest(case: Case, repeat: int) -> Measured:
+def fastest(case: Case, repeat: int, environment: Mapping[str, str] | None = None) -> Measured:
     """The fastest of some runs: whatever disturbs a measurement adds to its time."""
-    return min((measure(case) for _ in range(repeat)), key=lambda run: run["seconds"])
+    return min((measure(case, environment) for _ in range(repeat)), key=lambda run: run["seconds"])
 
 
 def run(case: Case) -> Result:
@@ -89,6 +93,8 @@ def run(case: Case) -> Result:
     sizes = (case.arms, case.joints, case.frames, case.gait)
     if case.way == "default":
         armature = scene.build_default(*sizes)
+        if case.few:
+            armature.octo_motion.locomotion.keys = "REDUCED"
     else:
         armature = scene.build(*sizes, skin=case.skin)
     result = _generated() if case.way in ("generate", "default") else _baked(armature, case)
@@ -110,10 +116,10 @@ def _generated() -> Result:
 
     operators: Any = bpy.ops.octo_motion
     watch, places = Stopwatch(), _places()
-    cpu, start = time.process_time(), time.perf_counter()
+    cpu, start = processor_seconds(), time.perf_counter()
     with watch.watching(places), watch.measure("all else"):
         operators.generate_locomotion()
-    seconds, cpu = time.perf_counter() - start, time.process_time() - cpu
+    seconds, cpu = time.perf_counter() - start, processor_seconds() - cpu
     return Result(0, seconds, cpu, peak_megabytes(), None, dict(watch.seconds))
 
 
@@ -164,6 +170,14 @@ def _places() -> dict[str, list[Place]]:
 def labels() -> Collection[str]:
     """What the time of a run is spent on, but for all else."""
     return _places()
+
+
+def processor_seconds() -> float:
+    """Seconds of the processor that this process has had, and those that it started and that have
+    ended.
+    """
+    spent = os.times()
+    return spent.user + spent.system + spent.children_user + spent.children_system
 
 
 def peak_megabytes() -> float:

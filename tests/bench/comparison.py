@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from octo_motion.core.processes import PROCESSES
 from tests.bench.case import Case, Measured, Way, fastest, measure
 
 WAYS: Final[dict[Way, str]] = {
@@ -122,6 +123,16 @@ def as_it_comes(options: Options) -> Measured:
     return {"gait": options.gait, "rows": rows}
 
 
+def with_few_keys(options: Options) -> list[Measured]:
+    """The same with few keys, from short to long, by one process and by as many as there may be."""
+    rows = []
+    for frames in sorted({*options.frames, *options.long}):
+        case = Case("default", frames, gait=options.gait, look=False, few=True)
+        alone = fastest(case, _runs(options, frames), {PROCESSES: "1"})
+        rows.append({"alone": alone, "shared": fastest(case, _runs(options, frames))})
+    return rows
+
+
 _FEWEST: Final = 4
 """Arms of a walk that holds a ground."""
 
@@ -229,6 +240,24 @@ def parts_lines(run: Measured) -> list[str]:
             if seconds > 1e-3 * whole
         ),
     ]
+
+
+def few_text(found: Any) -> str:
+    """Few keys by frames, and where the time of the longest goes."""
+    lines = [
+        "The default walk with few keys",
+        f"{'':>8} {'one process':>21}   {'one for each processor':>22}",
+        f"{'frames':>8} {'seconds':>10} {'ms/frame':>10}   {'seconds':>10} {'processors’':>11}",
+    ]
+    for row in found:
+        alone, shared = row["alone"], row["shared"]
+        lines.append(
+            f"{alone['frames']:>8} {alone['seconds']:>10.2f} "
+            f"{1000.0 * alone['seconds'] / alone['frames']:>10.2f}   "
+            f"{shared['seconds']:>10.2f} {shared['cpu_seconds']:>11.2f}"
+        )
+    note = "processors’: seconds that all processes had of all processors"
+    return "\n".join([*lines, "", note, "", *parts_lines(found[-1]["shared"])])
 
 
 def arms_text(found: Any) -> str:

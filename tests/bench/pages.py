@@ -82,6 +82,7 @@ SECTIONS: Final[dict[str, Section]] = {
     ),
     "default": Section(comparison.as_it_comes, comparison.default_text, comparison.default_said),
     "frames": Section(comparison.by_frames, comparison.frames_text),
+    "few": Section(comparison.with_few_keys, comparison.few_text),
     "arms": Section(comparison.by_arms, comparison.arms_text),
     "splices": Section(lambda options: splice_speed.measure(options.repeat), splice_speed.text),
     "live": Section(lambda _: live_speed.measure(), live_speed.text),

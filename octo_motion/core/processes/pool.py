@@ -15,8 +15,8 @@ import queue
 import subprocess
 import threading
 from collections import deque
-from collections.abc import Callable, Generator, Iterable
-from typing import Any, Final, Protocol, TypeVar
+from collections.abc import Callable, Generator, Iterable, Mapping
+from typing import Any, Final, TypeVar
 
 from .python import PROCESSES, processors, python_path, start_program
 from .wire import OURS, receive, send
@@ -31,7 +31,7 @@ _WAITING: Final = 1
 _PATIENCE: Final = 0.005
 """s after which whoever waits for a result may do something else."""
 _PROGRAM: Final = "octo_motion.core.processes.helper"
-_ENVIRONMENT: Final = dict.fromkeys(
+_ENVIRONMENT: Final[Mapping[str, str]] = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
 """There are as many processes as processors already."""
@@ -84,17 +84,15 @@ class _Failed:
     """In place of a result: there is none."""
 
 
-class _Worker(Protocol):
-    def __call__(self, *arguments: Any) -> Any: ...
-
-
 class _Pool:
     """Processes, each with a thread that hands it tasks and takes its answers."""
 
     def __init__(self, count: int) -> None:
-        self._tasks: queue.SimpleQueue[tuple[int, _Worker, Any] | None] = queue.SimpleQueue()
+        self._tasks: queue.SimpleQueue[tuple[int, Callable[[Any], Any], Any] | None] = (
+            queue.SimpleQueue()
+        )
         self._answers: queue.SimpleQueue[tuple[int, Any]] = queue.SimpleQueue()
-        self._given: dict[int, tuple[_Worker, Any]] = {}
+        self._given: dict[int, tuple[Callable[[Any], Any], Any]] = {}
         self._refused: deque[int] = deque()
         self._lock = threading.Lock()
         self._processes: list[subprocess.Popen[bytes]] = []
@@ -114,7 +112,7 @@ class _Pool:
         """Whether some task has no answer yet."""
         return bool(self._given)
 
-    def give(self, number: int, function: _Worker, task: Any) -> None:
+    def give(self, number: int, function: Callable[[Any], Any], task: Any) -> None:
         """Hand out a task."""
         self._given[number] = function, task
         self._tasks.put((number, function, task))
