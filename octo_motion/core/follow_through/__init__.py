@@ -3,7 +3,7 @@
 
 from .chains import Chain, between, chains_of, find_loose
 from .limbs import Followed, Limbs, limbs_of, own_rotations
-from .sampling import BoneMotion, Displacement, displacement
+from .sampling import BoneMotion, Displacement, displacement, repeats
 from .settings import MATERIALS, FollowSettings
 from .simulation import STEPS, BodyCapsules, FollowJob, MovingObstacles, Simulation, follow
 
@@ -27,4 +27,5 @@ __all__ = [
     "follow",
     "limbs_of",
     "own_rotations",
+    "repeats",
 ]

@@ -12,10 +12,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..rotations import Floats, conjugate, continuous, multiply, normalized, rotate
+from ..rotations import (
+    Floats,
+    angle_between,
+    conjugate,
+    continuous,
+    multiply,
+    normalized,
+    rotate,
+    to_rotation_vector,
+)
 
 _AROUND = 2
 """Frames on either side that a slope is made of."""
+_ALIKE = 0.01
+"""Of a body's size, how far its bones may be from where they began …"""
+_ALIKE_TURN = np.radians(1.0)
+"""… and turned from how they were, in a motion that repeats; and by how much more than ever their
+turn from frame to frame may change."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +92,29 @@ def displacement(motion: BoneMotion, bone: int) -> Displacement:
     turn = multiply(motion.orientations[-1, bone], conjugate(motion.orientations[0, bone]))
     shift = motion.positions[-1, bone] - rotate(turn, motion.positions[0, bone])
     return Displacement(normalized(turn), shift)
+
+
+def repeats(motion: BoneMotion, cycle: Displacement) -> bool:
+    """Whether a motion ends as it begins, in pose and in speed, here or elsewhere.
+
+    Files of clips do not say which of them are loops, and loops are what most of them are. What has
+    turned meanwhile is none: a body that only rocks to and fro is alike at any time.
+    """
+    turned = angle_between(cycle.turn, np.array([1.0, 0.0, 0.0, 0.0]))
+    if len(motion) <= _AROUND or turned > _ALIKE_TURN:
+        return False
+    # A single bone has no size: then what is lost in rounding is no reason.
+    size = np.ptp(motion.positions[0], axis=0).max() + 1e-6 * np.abs(motion.positions).max()
+    again = cycle.of(_rows(motion, np.array([0, 1])))
+    off = np.linalg.norm(again.positions[0] - motion.positions[-1], axis=-1)
+    turned = angle_between(again.orientations[0], motion.orientations[-1])
+    if off.max() > _ALIKE * size or turned.max() > _ALIKE_TURN:
+        return False
+    # One more step, of the next round: at the seam speeds change no more than elsewhere.
+    turns = np.concatenate([motion.orientations, again.orientations[1:]])
+    speeds = to_rotation_vector(multiply(turns[1:], conjugate(turns[:-1])))
+    changes = np.linalg.norm(np.diff(speeds, axis=0), axis=-1)
+    return bool((changes[-1] <= _ALIKE_TURN + changes[:-1].max(axis=0)).all())
 
 
 class Sampler:

@@ -40,6 +40,7 @@ from ...core.follow_through import (
     follow,
     limbs_of,
     own_rotations,
+    repeats,
 )
 from ...core.keyframes import Channel, Limb, Track, reducing
 from ...core.phrases import phrase
@@ -269,8 +270,12 @@ def _read(armature: bpy.types.Object) -> _Read:
     orientations, heads = clip.posed()
     motion = BoneMotion(clip.rate, reader.unit * heads, orientations)
     root = [*skeleton.ancestors(limbs.bones[0]), limbs.bones[0]]
-    cyclic = settings.loop and clip.cyclic
     still, things = _obstacles(armature, settings, reader.unit)
+    cycle = displacement(motion, root[max(len(root) - 2, 0)])
+    strengths = _strengths(armature, limbs, chains, clip.frames, (base, slot))
+    # What else moves need not be where it was when the action begins again.
+    alone = not things and (strengths is None or np.array_equal(strengths[0], strengths[-1]))
+    loops = settings.loop and (clip.cyclic or (alone and repeats(motion, cycle)))
     job = FollowJob(
         limbs,
         reader.figure(limbs.bones, limbs.parents),
@@ -280,8 +285,8 @@ def _read(armature: bpy.types.Object) -> _Read:
         obstacles=still,
         moving=_moving(things, clip, reader.unit),
         body=BodyCapsules(*reader.rest_of_body(limbs.bones)) if settings.body else None,
-        strengths=_strengths(armature, limbs, chains, clip.frames, (base, slot)),
-        cycle=displacement(motion, root[max(len(root) - 2, 0)]) if cyclic else None,
+        strengths=strengths,
+        cycle=cycle if loops else None,
     )
     job.check()
     names = tuple(skeleton.names[each] for each in limbs.bones)

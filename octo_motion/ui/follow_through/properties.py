@@ -99,8 +99,8 @@ class OCTO_MOTION_PG_follow_through(Floor, FollowPhysics, bpy.types.PropertyGrou
     )
     loop: props.BoolProperty(
         name="Loop",
-        description="An action that repeats is run until the bones repeat themselves too, so that "
-        "its end meets its beginning",
+        description="An action that ends as it begins, or is marked as cyclic, is run until the "
+        "bones repeat themselves too, so that its end meets its beginning",
         default=True,
     )
     visual: props.BoolProperty(

@@ -22,6 +22,7 @@ from octo_motion.core.follow_through import (
     Simulation,
     displacement,
     follow,
+    repeats,
 )
 from octo_motion.core.posing.solver import Plane, Sphere
 from octo_motion.core.rotations import (
@@ -154,6 +155,39 @@ def test_loop_that_travels_and_turns_closes_too() -> None:
     found = done(replace(job, cycle=leads))
     assert found.repeats
     assert np.array_equal(found.turns[0], found.turns[-1])
+
+
+def turning_by(angle: Callable[[Floats], Floats]) -> Callable[[Floats], tuple[Floats, Floats]]:
+    """Turns about Z by an angle of the time."""
+
+    def moved(times: Floats) -> tuple[Floats, Floats]:
+        turns = np.zeros((len(times), 3))
+        turns[:, 2] = angle(times)
+        return np.zeros((len(times), 3)), turns
+
+    return moved
+
+
+@pytest.mark.parametrize(
+    ("what", "seconds", "loop"),
+    [
+        (wagging, 1.0, True),
+        (wagging, 2.0, True),
+        (wagging, 0.9, False),
+        # As far back as it began, and then it would have to turn round at once.
+        (wagging, 0.5, False),
+        (turning_by(lambda t: 0.5 * np.sin(np.pi * np.clip(t / 0.8, 0.0, 1.0)) ** 2), 1.0, True),
+        (turning_by(lambda t: np.abs(np.sin(np.pi * t))), 1.0, False),
+        (stopping, 1.0, True),
+        (turning_by(lambda t: 0.0 * t), 0.0, False),
+    ],
+)
+def test_motion_that_ends_as_it_begins_is_a_loop(
+    what: Callable[[Floats], tuple[Floats, Floats]], seconds: float, *, loop: bool
+) -> None:
+    motion = tail_job(what, seconds=seconds).motion
+    # The tail hangs on the body, which may be elsewhere.
+    assert repeats(motion, displacement(motion, 0)) is loop
 
 
 @pytest.mark.parametrize("medium", ["NONE", "WATER"])

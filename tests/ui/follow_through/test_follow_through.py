@@ -45,16 +45,24 @@ def make_fox(*, scale: float = 1.0, mode: str = "QUATERNION") -> Any:
     return armature
 
 
+def fcurves(action: Any) -> list[Any]:
+    """Of all its slots."""
+    return [
+        curve
+        for layer in action.layers
+        for strip in layer.strips
+        for bag in strip.channelbags
+        for curve in bag.fcurves
+    ]
+
+
 def keys(action: Any) -> dict[tuple[str, int], list[tuple[float, ...]]]:
     """All that an action's keys are."""
     return {
         (curve.data_path, curve.array_index): [
             (*key.co, *key.handle_left, *key.handle_right) for key in curve.keyframe_points
         ]
-        for layer in action.layers
-        for strip in layer.strips
-        for bag in strip.channelbags
-        for curve in bag.fcurves
+        for curve in fcurves(action)
     }
 
 
@@ -198,6 +206,32 @@ def test_cycle_meets_its_beginning() -> None:
     usual = np.linalg.norm(np.diff(turned, axis=0), axis=-1).max(axis=0)
     assert (seam <= 1.1 * usual).all()
     assert follow_settings(fox).result.use_cyclic
+
+
+@pytest.mark.parametrize("last", [FRAMES, FRAMES - 4])
+def test_loop_that_nothing_marks_as_one_meets_its_beginning(last: int) -> None:
+    """Clips from files: whether they are loops is seen from their ends alone."""
+    fox = make_fox()
+    for curve in fcurves(bpy.data.actions["Wag"]):
+        for key in reversed(curve.keyframe_points):
+            if key.co.x > last:
+                curve.keyframe_points.remove(key)
+    select_tail(fox)
+    bpy.ops.octo_motion.follow_through()
+    shown = played(fox, range(1, last + 1))
+    turned = np.diff(shown[..., :3, 1], axis=0)
+    seam = np.linalg.norm(turned[0] - turned[-1], axis=-1)
+    usual = np.linalg.norm(np.diff(turned, axis=0), axis=-1).max(axis=0)
+    if last == FRAMES:
+        assert np.abs(shown[0] - shown[-1]).max() < 1e-6
+        assert (seam <= 1.1 * usual).all()
+    else:
+        assert np.abs(shown[0] - shown[-1]).max() > 0.1
+    assert not bpy.data.actions["Wag"].use_cyclic
+    # And as it was, where it is not to be one.
+    follow_settings(fox).loop = False
+    bpy.ops.octo_motion.follow_through()
+    assert np.abs(played(fox, [1])[0] - played(fox, [last])[0]).max() > 0.01
 
 
 def test_chains_are_found_by_their_names_listed_and_told_apart() -> None:
