@@ -42,10 +42,10 @@ class _Previews:
     def of(self, job: RetargetJob) -> RetargetPreview:
         """What it is worked out from now."""
         still = job.still.world[0].tobytes(), len(job.still)
-        told = [_told(each) for each in (job.base, job.source, job.standing)]
+        told = [_told(each) for each in (job.base, job.source)]
         if self._preview is None or self._known != (*still, told):
             self._known = *still, told
-            self._preview = RetargetPreview(job.base, job.still, job.source, job.standing)
+            self._preview = RetargetPreview(job.base, job.still, job.source)
         return self._preview
 
 

@@ -36,10 +36,8 @@ from ...core.splicing.clip import Clip
 from ...core.splicing.humanoid import LANDMARKS, OPTIONAL
 from ...core.splicing.transfer import (
     LimbGoal,
-    MappedClip,
     WholeBody,
     reference_doubts,
-    rests_standing,
     retarget_clip,
     retargeting_clip,
 )
@@ -53,8 +51,6 @@ from .stack import ClipReader, Source, is_source, local_object
 _GROUND_SPACING: Final = 0.02
 """Of the body's height: metres between samples of a ground."""
 
-_ALIKE: Final = float(np.cos(np.radians(10.0)))
-"""Cosine of how far two ways up may be apart and count as one."""
 _GROUND_REACH: Final = 0.8
 """Of the body's height, to all sides of its way."""
 
@@ -66,9 +62,8 @@ class RetargetJob:
     armature: str
     """Names of objects: references do not outlive a modal operator's tick."""
     base: Source
-    """By what the body is compared."""
-    standing: MappedClip
-    """That tells at which height it stands."""
+    """A motion of the body, its rest pose if there is none: by it the body is compared, and it
+    tells at which height it stands."""
     still: Clip
     source: Source
     settings: WholeBody
@@ -100,14 +95,14 @@ class RetargetJob:
             GroundError: it leaves the ground.
         """
         settings = replace(self.settings, ground=finished(self.finding_ground()))
-        return retarget_clip(self.base, self.still, self.source, settings, self.standing)
+        return retarget_clip(self.base, self.still, self.source, settings)
 
     def finding_ground(self) -> Generator[None, None, Ground | None]:
         """The ground under its way, in steps; none without a mesh."""
         if self.triangles is None:
             return None
         plain = replace(self.settings, foot_lock=False)
-        clip = yield from retargeting_clip(self.base, self.still, self.source, plain, self.standing)
+        clip = yield from retargeting_clip(self.base, self.still, self.source, plain)
         _, heads = clip.posed()
         hips = heads[:, clip.skeleton.index[self.base.humanoid()["hips"]]]
         size = float(np.ptp(heads[0, :, 2]))
@@ -162,15 +157,13 @@ def prepare_retarget(
     reader = reader or ClipReader()
     settings = splicing_settings(armature).retarget
     clip = reader.source(source, action, slot, visual=settings.visual)
-    moving = _own_motion(armature, own or reader)
-    base = _base(armature, moving)
+    base = _own_motion(armature, own or reader) or _resting(armature)
     for each in (base, clip):
         _check_landmarks(each)
     goal = cast("LimbGoal", settings.mode.lower())
     return RetargetJob(
         armature.name,
         base,
-        base if moving is None else moving,
         still_clip(armature, clip.clip.frames, clip.clip.rate),
         clip,
         WholeBody(goal, travel=settings.travel, foot_lock=settings.foot_lock),
@@ -199,17 +192,11 @@ def _triangles(settings: Any) -> Floats | None:
     return triangles
 
 
-def _base(armature: bpy.types.Object, moving: Source | None) -> Source:
-    """By what a body is compared: its rest pose if that is one of somebody who stands, the same way
-    up as in a motion of its own, else that motion.
-    """
+def _resting(armature: bpy.types.Object) -> Source:
+    """A body of which nothing but its rest pose is known."""
     still = still_clip(armature, np.array([1.0]), 24.0)
-    known = known_landmarks(armature, still.skeleton, None if moving is None else moving.lies)
-    resting = Source(still, known.landmarks, armature.name, known.problem, known.found)
-    if moving is None:
-        return resting
-    stands = rests_standing(still.skeleton, known.landmarks)
-    return resting if stands and resting.up @ moving.up > _ALIKE else moving
+    known = known_landmarks(armature, still.skeleton, None)
+    return Source(still, known.landmarks, armature.name, known.problem, known.found)
 
 
 def _own_motion(armature: bpy.types.Object, reader: ClipReader) -> Source | None:
@@ -316,7 +303,7 @@ def _remember(settings: Any, job: RetargetJob) -> None:
     own = own_action(local_object(job.armature))
     if settings.retarget.standing is not None or own is None or is_generated(own[0]):
         return
-    if own[0].name == job.standing.clip.name:
+    if own[0].name == job.base.clip.name:
         settings.retarget.standing = own[0]
 
 

@@ -30,7 +30,6 @@ from .timing_suggestions import Suggestion, suggest_timings
 from .whole_body import (
     RetargetPreview,
     WholeBody,
-    rests_standing,
     retarget_clip,
     retargeting_clip,
 )
@@ -61,7 +60,6 @@ __all__ = [
     "part_bones",
     "part_named",
     "reference_doubts",
-    "rests_standing",
     "retarget_clip",
     "retargeting_clip",
     "suggest_timings",

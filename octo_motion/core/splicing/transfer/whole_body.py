@@ -20,10 +20,8 @@ from ...rotations import (
     Floats,
     from_matrix,
     multiply,
-    normalized,
     rotate,
 )
-from ...skeleton import Skeleton
 from ...smoothing import blurred
 from ...steps import finished
 from ..clip import (
@@ -35,7 +33,6 @@ from ..clip import (
     sample_clip,
     spread_clip,
 )
-from ..humanoid import Landmarks, chain_length
 from .foot_contacts import (
     FootContacts,
     FootPaths,
@@ -54,7 +51,7 @@ from .leg_travel import (
     write_hips,
 )
 from .loop_rounds import Rounds, is_loop, own_round
-from .parts import LEG, PARTS
+from .parts import PARTS
 from .rehung import Rehung, whole_limbs
 from .retarget import (
     MappedClip,
@@ -69,13 +66,6 @@ from .travel_lock import SIGHT, above_soles, answering_balls, size_ratio
 
 _PARTS: Final = ("legs", "trunk", "left_arm", "right_arm", "head")
 """In the order in which they are put on: each hangs on those before it."""
-
-_STANDING: Final = ("upper_arm", "thigh", "shin", "foot")
-_WIDE: Final = ("upper_arm", "thigh")
-_STRAIGHT: Final = 0.85
-"""Of its bones: how long a leg is from hip to ankle at least when somebody stands."""
-_UPRIGHT: Final = 0.85
-"""Cosine of how far legs are off the trunk then, and the shoulders off the hips."""
 
 _LOOKS: Final = 100
 """Moments of a body's own motion at which one sees how it holds what no part takes."""
@@ -109,10 +99,9 @@ def retarget_clip(
     still: Clip,
     source: MappedClip,
     settings: WholeBody | None = None,
-    standing: MappedClip | None = None,
 ) -> Clip:
     """What :func:`retargeting_clip` comes to."""
-    return finished(retargeting_clip(base, still, source, settings, standing))
+    return finished(retargeting_clip(base, still, source, settings))
 
 
 def retargeting_clip(
@@ -120,25 +109,22 @@ def retargeting_clip(
     still: Clip,
     source: MappedClip,
     settings: WholeBody | None = None,
-    standing: MappedClip | None = None,
 ) -> Generator[None, None, Clip]:
     """A whole clip on another body, over all frames of a clip of that body that does nothing, in
     steps.
 
     Args:
-        base: a clip of the body that gets it, by which the two are compared; it may be the same as
-            the next.
+        base: a clip of the body that gets it, by which the two are compared; it tells at which
+            height it stands, and how it holds what no part takes.
         still: of its skeleton, at rest where nothing is carried over, as many frames as the source
             has; it says where its object stands, and at what frames the result is.
         source: the clip.
         settings: how, as usual if not given.
-        standing: a clip of that body that tells at which height it stands, and how it holds what
-            no part takes; the base if not given.
 
     Raises:
         ClipError: a landmark is missing, or the hips cannot leave their parent.
     """
-    pair = yield from _pairing(base, still, source, standing)
+    pair = yield from _pairing(base, still, source)
     return (yield from pair.moving(settings or WholeBody()))
 
 
@@ -152,11 +138,9 @@ class RetargetPreview:
         ClipError: a landmark is missing, or the hips cannot leave their parent.
     """
 
-    def __init__(
-        self, base: MappedClip, still: Clip, source: MappedClip, standing: MappedClip | None = None
-    ) -> None:
+    def __init__(self, base: MappedClip, still: Clip, source: MappedClip) -> None:
         self._frames = still.frames
-        self._pair = finished(_pairing(base, still, source, standing))
+        self._pair = finished(_pairing(base, still, source))
 
     def whole(self, settings: WholeBody) -> Generator[None, None, Clip]:
         """All frames, exactly as :func:`retargeting_clip` has them, in steps."""
@@ -186,7 +170,8 @@ class _Pair:
     base: MappedClip
     source: MappedClip
     retargets: list[Retarget]
-    stands: MappedClip
+    whole: MappedClip
+    """The body with its limbs whole."""
     still: Clip
     """The body as it is, that does nothing, …"""
     joined: Clip
@@ -209,7 +194,7 @@ class _Pair:
     @cached_property
     def stance(self) -> Stance:
         """How the body stands."""
-        return find_stance(own_paths(self.stands, self.balls))
+        return find_stance(own_paths(self.whole, self.balls))
 
     def moving(
         self, settings: WholeBody, rows: np.ndarray | None = None
@@ -230,18 +215,12 @@ class _Pair:
         return result
 
 
-def _pairing(
-    base: MappedClip, still: Clip, source: MappedClip, standing: MappedClip | None
-) -> Generator[None, None, _Pair]:
+def _pairing(base: MappedClip, still: Clip, source: MappedClip) -> Generator[None, None, _Pair]:
     assert len(still) == len(source.clip)
-    if standing is not None and standing is not base:
-        # Where joints are a body's motion says: a file may rest with them elsewhere.
-        base = MappedClip(_held_as_usual(base.clip, standing, turned=False), base.landmarks)
-    still = _held_as_usual(still, base if standing is None else standing)
+    still = _held_as_usual(still, base)
     whole, hung = whole_limbs(base)
     source, _ = whole_limbs(source)
     joined = still if hung is None else hung.into(still)
-    stands = whole_limbs(standing)[0] if standing is not None else whole
     yield
     ours, theirs = compared(whole, source)
     rests = ours.rests if isinstance(ours, ReferredClip) else None
@@ -252,47 +231,22 @@ def _pairing(
         seen_from = "pelvis" if name == "legs" else ""
         retargets += find_retargets(PARTS[name], ours, theirs, clavicle=True, seen_from=seen_from)
         yield
-    return _Pair(ours, theirs, retargets, stands, still, joined, before, hung, rests)
+    return _Pair(ours, theirs, retargets, whole, still, joined, before, hung, rests)
 
 
-def rests_standing(skeleton: Skeleton, landmarks: Landmarks | None) -> bool:
-    """Whether a skeleton's rest pose is one of somebody who stands: with straight legs below the
-    trunk, and both sides where they belong. Which way up is in its file does not count.
-    """
-    names = ("hips", "head", *(f"{each}.{side}" for each in _STANDING for side in "LR"))
-    if landmarks is None:
-        return False
-    bones = [skeleton.index.get(landmarks.get(name) or "", -1) for name in names]
-    if min(bones) < 0:
-        return False
-    heads = dict(zip(names, skeleton.heads[bones], strict=True))
-    up = normalized(heads["head"] - heads["hips"])
-    across = [normalized(heads[f"{each}.L"] - heads[f"{each}.R"]) for each in _WIDE]
-    if float(across[0] @ across[1]) < _UPRIGHT or abs(float(up @ across[1])) > 1.0 - _UPRIGHT:
-        return False
-    for side in "LR":
-        way = heads[f"foot.{side}"] - heads[f"thigh.{side}"]
-        chain = chain_length(skeleton, [bones[names.index(f"{e}.{side}")] for e in LEG.limb or ()])
-        length = float(np.linalg.norm(way))
-        if length < _STRAIGHT * chain or float(-way @ up) < _UPRIGHT * length:
-            return False
-    return True
-
-
-def _held_as_usual(still: Clip, own: MappedClip, *, turned: bool = True) -> Clip:
+def _held_as_usual(still: Clip, own: MappedClip) -> Clip:
     """A body that does nothing, with bones on their parents as they usually are in a motion of its
     own: fingers round a grip, hair, what carries limbs. That is what becomes of those that no part
     takes, whatever its file's rest pose is. What carries the hips stays where it rests, turned as
-    that motion begins. If not ``turned`` all bones keep their rotations.
+    that motion begins.
     """
     skeleton, looks = still.skeleton, spread_clip(own.clip, _LOOKS)
     hips = own.bone("hips")
     above = skeleton.ancestors(hips)
     bones = [bone for bone in range(len(skeleton)) if bone not in (hips, *above)]
     rotations, locations = still.rotations.copy(), still.locations.copy()
-    if turned:
-        rotations[:, above] = looks.rotations[0, above]
-        rotations[:, bones] = robust_rotations(looks.rotations[:, bones], np.ones((len(looks), 1)))
+    rotations[:, above] = looks.rotations[0, above]
+    rotations[:, bones] = robust_rotations(looks.rotations[:, bones], np.ones((len(looks), 1)))
     locations[:, bones] = robust_places(looks.locations[:, bones])
     return replace(still, rotations=rotations, locations=locations)
 
