@@ -22,6 +22,7 @@ from .clip_clock import ClipClock, MarkerPair, RateCurve
 from .rest_pose import (
     Reresting,
     average_pose,
+    rest_offsets,
     robust_direction,
     robust_places,
     robust_rotations,
@@ -56,6 +57,7 @@ __all__ = [
     "moments_within",
     "orientations_of",
     "posture_of",
+    "rest_offsets",
     "robust_direction",
     "robust_places",
     "robust_rotations",

@@ -30,6 +30,9 @@ Integers = NDArray[np.intp]
 After = Literal["hold", "loop", "stop"]
 AFTER: Final = ("hold", "loop", "stop")
 
+_TELLING: Final = 16
+"""Frames at most that say what an easing is as a whole."""
+
 _ON_THE_WAY: Final = 64
 """Frames at most on which one frame of an easing hangs."""
 
@@ -90,9 +93,13 @@ class SpliceWindow:
     a way through the world begins and ends."""
     blended: bool = False
     """Whether a weight of its own lets it act in part: it then comes and goes as one."""
+    told: Floats | None = None
+    """(window,) :attr:`telling`, of a window of which some frames were taken."""
 
     def easing(self, row: int) -> list[int]:
-        """The base's frames from this one to the middle of the easing in which it lies."""
+        """The base's frames from this one to the middle of the easing in which it lies, and those
+        that tell what it is as a whole.
+        """
         number = row - self.frames.start
         if not 0 <= number < len(self.weights):
             return []
@@ -103,8 +110,24 @@ class SpliceWindow:
                 first, last = sorted((int(place[0]), center))
                 # Of a long way there, as many as show which way round it goes.
                 rows = np.linspace(first, last, min(last - first + 1, _ON_THE_WAY)).astype(np.intp)
+                rows = np.union1d(rows, np.flatnonzero(self.telling[same]))
                 return (same[rows] + self.frames.start).tolist()
         return []
+
+    @cached_property
+    def telling(self) -> Floats:
+        """(window,) how much frames say of what an easing is as a whole: a few, spread over it, by
+        the time that they stand for and as base and splice are equally strong there.
+        """
+        if self.told is not None:
+            return self.told
+        says = np.zeros(len(self.weights))
+        for each in self.easings:
+            some = np.linspace(0, len(each) - 1, min(len(each), _TELLING)).round()
+            rows = each[some.astype(np.intp)]
+            steps = np.gradient(self.looks[rows]) if len(rows) > 1 else np.ones(1)
+            says[rows] = steps * self.weights[rows] * (1.0 - self.weights[rows])
+        return says
 
     @cached_property
     def easings(self) -> list[Integers]:
@@ -130,6 +153,7 @@ class SpliceWindow:
             self.seam_speeds[chosen],
             (int(first), min(int(last), len(chosen) - 1)),
             self.blended,
+            self.telling[chosen],
         )
 
     def weighted(self, shares: Floats) -> SpliceWindow:

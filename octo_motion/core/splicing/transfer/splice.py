@@ -24,10 +24,7 @@ from ...rotations import (
     IDENTITY,
     Floats,
     conjugate,
-    continuous,
-    from_rotation_vector,
     multiply,
-    to_rotation_vector,
 )
 from ...steps import finished
 from ..clip import (
@@ -39,9 +36,9 @@ from ..clip import (
     sample_clip,
     sample_scales,
     splice_window,
-    window_middle,
 )
 from ..humanoid import Landmarks
+from .easing import ease
 from .foot_lock import GroundHeight
 from .leg_travel import LegTravel, ground_height
 from .mirror import mirror_name, mirrored_clip
@@ -335,7 +332,7 @@ class Splicer:
             yield from self._adding(base, span, before, turned, moved)
             yield
         if (span.weights < 1.0).any():
-            _ease(base, span, self._bones, turned, moved)
+            ease(base, span, self._bones, turned, moved)
             yield
         if self._travel is not None:
             whole = posture_of(base.skeleton, base.rotations, base.locations)
@@ -409,41 +406,6 @@ class Splicer:
         if reference == "rest":
             return None
         return float(self._clip.frames[0]) if reference == "first" else float(reference)
-
-
-def _ease(
-    base: Clip, span: SpliceWindow, bones: Sequence[int], rotations: Floats, locations: Floats
-) -> None:
-    """Mix the base back in where the splice comes and goes."""
-    # Where the splice has no weight, the very values of the base.
-    for own, made in ((base.rotations, rotations), (base.locations, locations)):
-        rows = np.ix_(np.flatnonzero(span.weights == 0.0), bones)
-        made[rows] = own[span.frames][rows]
-    for chosen in span.easings:
-        frames = chosen + span.frames.start
-        weights = span.weights[chosen][:, None]
-        own = base.rotations[frames][:, bones]
-        # The way round is chosen once, where the two are about equally strong, and kept: the short
-        # way frame by frame would jump where they are half a turn apart.
-        between = continuous(multiply(conjugate(own), rotations[chosen][:, bones]))
-        center = window_middle(weights[:, 0])
-        between = np.where(between[center, :, :1] < 0.0, -between, between)
-        mixed = multiply(own, _power(between, weights))
-        rotations[np.ix_(chosen, bones)] = mixed
-        still = base.locations[frames][:, bones]
-        there = locations[np.ix_(chosen, bones)]
-        locations[np.ix_(chosen, bones)] = still + weights[..., None] * (there - still)
-
-
-def _power(quaternions: Floats, shares: Floats) -> Floats:
-    """A share of each rotation, along the way round that its sign says."""
-    far = quaternions[..., :1] < 0.0
-    vector = to_rotation_vector(quaternions)
-    angle = np.linalg.norm(vector, axis=-1, keepdims=True)
-    # The sign of a quaternion tells the short way round from the long one.
-    long_way = 1.0 - 2.0 * np.pi / np.maximum(angle, 1e-9)
-    vector = np.where(far, vector * long_way, vector)
-    return from_rotation_vector(vector * shares[..., None])
 
 
 # --- A stack looked at frame by frame, quick enough for every move of the mouse -------------------
