@@ -429,6 +429,25 @@ def test_rate_and_frames_are_the_scenes_unless_given():
     assert list(read_clip(armature).frames) == [5, 6, 7, 8]
 
 
+@pytest.mark.parametrize("off", [0.5, 1000.25])
+def test_keys_beside_whole_frames_are_read_where_they_are(off: float):
+    armature = make_rig()
+    curves = animate(armature)
+    on_frames = read_clip(armature)
+    for curve in curves:
+        for key in curve.keyframe_points:
+            # With its handles.
+            key.co_ui.x += off
+    clip = read_clip(armature)
+    assert np.allclose(clip.frames, on_frames.frames + off)
+    assert np.abs(clip.posed()[1] - on_frames.posed()[1]).max() < 1e-3
+    # Between keys that are anyhow there is no better place than whole frames.
+    for curve in curves:
+        for number, key in enumerate(curve.keyframe_points):
+            key.co_ui.x += 0.3 * number
+    assert np.all(read_clip(armature).frames % 1.0 == 0.0)
+
+
 def test_what_another_action_left_behind_is_no_part_of_a_clip_but_a_pose_without_keys_is():
     armature = make_rig()
     bones = armature.pose.bones

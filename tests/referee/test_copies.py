@@ -67,6 +67,17 @@ def test_what_moves_joints_is_spliced_alike_onto_bones_that_are_connected_and_th
         assert off.turn < 1.0, off
 
 
+@pytest.mark.parametrize("pair", [(WALK, CMU), (KNIGHT, WALK)])
+def test_keys_between_frames_are_spliced_as_those_on_frames(
+    shared_data: SharedData, tmp_path: Path, pair: tuple[str, str]
+) -> None:
+    stacks = (*STACKS, "whole")
+    for off in differences(shared_data, tmp_path, pair, ("on half frames",), stacks):
+        assert not off.problem
+        assert off.fading < 1e-3, off
+        assert off.turn < 1.0, off
+
+
 @pytest.mark.parametrize("pair", [(WALK, THROW), (THROW, WALK)])
 def test_two_files_of_one_body_that_rest_in_one_pose_are_spliced_alike(
     shared_data: SharedData, tmp_path: Path, pair: tuple[str, str]

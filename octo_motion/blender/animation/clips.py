@@ -33,6 +33,7 @@ from ..rig import armature_data, bone_and_property, pose_of, read_skeleton, worl
 from .actions import (
     curves_of,
     delta_rotation,
+    key_points,
     parent_frame,
     read_channels,
     read_object_channels,
@@ -128,8 +129,9 @@ def reading_clip(
         slot: the slot of the action; if none is given the one that the armature uses, or would.
         visual: as the scene shows it, with NLA, constraints, drivers and moving parents. Plays
             the scene, so takes longer.
-        frames: (frames,) ascending, subframes allowed; the whole frames between the slot's first
-            and last key, or of the action's manual frame range, if none is given.
+        frames: (frames,) ascending, subframes allowed; those between the slot's first and last
+            key, whole ones unless most keys miss these, or of the action's manual frame range, if
+            none is given.
         rate: frames per second, the scene's if none is given.
         unkeyed: the armature's unkeyed pose, if it is known.
 
@@ -234,13 +236,14 @@ def write_clip(
 def is_recorded(
     armature: bpy.types.Object, action: bpy.types.Action, slot: bpy.types.ActionSlot | None
 ) -> bool:
-    """Whether an action has poses at whole frames, and nothing of its own in between.
+    """Whether an action has poses a frame apart, and nothing of its own in between.
 
     Straight curves of angles from one to the next are what the file's format or its rest pose makes
     of it, and may lead far off the shortest way: so nothing is read from them.
     """
     curves = _curves_of(action, slot or slot_of(armature, action), read_skeleton(armature))
-    return all(goes_straight(each) for own in curves.values() for each in own.values())
+    off = _off_whole_frames(curves) if curves else 0.0
+    return all(goes_straight(each, off) for own in curves.values() for each in own.values())
 
 
 def clip_channels(
@@ -618,10 +621,14 @@ def _curves_of(action: bpy.types.Action, slot: bpy.types.ActionSlot, skeleton: S
 
 
 def _action_range(action: bpy.types.Action, curves: _Curves) -> Floats:
-    """The whole frames within the keys (or the artist's own range), at least the two ends."""
+    """The frames within the keys (or the artist's own range), at least the two ends: whole ones,
+    or as far off these as most keys are, or the range begins.
+    """
     if action.use_frame_range:
         start, end = action.frame_start, action.frame_end
+        off = start
     else:
+        off = _off_whole_frames(curves)
         ranges = [
             key_range(curve)
             for components in curves.values()
@@ -644,13 +651,26 @@ def _action_range(action: bpy.types.Action, curves: _Curves) -> Floats:
             ),
             "Choose an action with keys at two frames or more.",
         )
-    return _whole_frames(start, end)
+    return _frames_within(start, end, off)
 
 
-def _whole_frames(start: float, end: float) -> Floats:
+def _frames_within(start: float, end: float, off: float = 0.0) -> Floats:
     # Frames are single precision in Blender, and importers miss whole ones by a little.
-    first, last = np.ceil(start - 1e-3), np.floor(end + 1e-3)
-    return np.arange(first, last + 1.0) if last > first else np.array([start, end])
+    off = float(np.round(off, 3)) % 1.0
+    first, last = np.ceil(start - off - 1e-3), np.floor(end - off + 1e-3)
+    return off + np.arange(first, last + 1.0) if last > first else np.array([start, end])
+
+
+def _off_whole_frames(curves: _Curves) -> float:
+    """By how much of a frame most keys miss whole frames: a recorded motion may be moved by half of
+    one, and between its keys is what its format makes of it.
+    """
+    every = [curve for components in curves.values() for curve in components.values()]
+    longest = max(every, key=lambda curve: len(curve.keyframe_points))
+    parts = np.round(np.round(key_points(longest)[:, 0].astype(np.float64), 3) % 1.0, 3) % 1.0
+    values, counts = np.unique(parts, return_counts=True)
+    most = int(counts.argmax()) if len(counts) else -1
+    return float(values[most]) if most >= 0 and 2 * counts[most] > len(parts) else 0.0
 
 
 def scene_rate() -> float:
@@ -669,7 +689,7 @@ def _track_range(armature: bpy.types.Object) -> Floats:
             phrase("All NLA strips of '{armature}' are muted.", armature=armature.name),
             "Unmute one.",
         )
-    return _whole_frames(
+    return _frames_within(
         min(strip.frame_start for strip in strips), max(strip.frame_end for strip in strips)
     )
 

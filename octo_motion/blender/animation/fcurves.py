@@ -63,14 +63,16 @@ def key_range(curve: bpy.types.FCurve) -> tuple[float, float]:
     return float(start), float(end)
 
 
-def goes_straight(curve: bpy.types.FCurve) -> bool:
-    """Whether a curve goes straight from whole frame to whole frame, as recorded motions do."""
+def goes_straight(curve: bpy.types.FCurve, off: float = 0.0) -> bool:
+    """Whether a curve goes straight from whole frame to whole frame, as recorded motions do, or
+    between frames that are so much ``off`` these.
+    """
     keys = _readable_keys(curve)
     if keys is None:
         return False
     times, _, kinds = keys
     straight = (kinds == enum_value("interpolation", "LINEAR")).all()
-    return bool(straight and np.abs(times - np.round(times)).max() < _WHOLE)
+    return bool(straight and np.abs(times - off - np.round(times - off)).max() < _WHOLE)
 
 
 @cache
