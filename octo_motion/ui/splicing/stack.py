@@ -73,6 +73,7 @@ from ...core.splicing.transfer import (
     part_bones,
     part_named,
     suggest_timings,
+    whole_limbs,
 )
 from ...core.steps import finished
 from ..declared_settings import plain
@@ -833,7 +834,8 @@ def _constrained(base: Source, splice: Splice) -> list[str]:
 def _changed(base: Source, splice: Splice) -> tuple[str, ...]:
     """Names of the base's bones that a splice moves otherwise."""
     marks = base.landmarks
-    bones = part_bones(splice.part, base.clip.skeleton, marks, clavicle=splice.clavicle)
+    skeleton = base.skeleton if splice.part.kind is None else whole_limbs(base)[0].skeleton
+    bones = part_bones(splice.part, skeleton, marks, clavicle=splice.clavicle)
     return (*bones, marks["hips"]) if splice.travel and marks is not None else bones
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from mathutils import Matrix
+from mathutils import Matrix, Quaternion
 
 from octo_motion.blender.animation.actions import MARK
 from octo_motion.ui.splicing.retargeting import RetargetSession, file_clip
@@ -409,6 +409,45 @@ def test_legs_that_travel_and_stand_are_right_between_frames_too() -> None:
         # Measured: 0.03 %, and 0.5 % where a foot takes hold; by keys on whole frames alone 0.15 %.
         assert np.median(off) < 0.0007
         assert off.max() < 0.01
+
+
+def test_a_torso_that_carries_the_hips_is_spliced_without_moving_the_legs() -> None:
+    """And legs that travel leave it as upright as it was."""
+    body = BODIES["hips on a torso"]
+    source = make_body("Bowing", BODIES["like it"])
+    walk(source, BODIES["like it"])
+    for frame in (1, LAST):
+        spine = source.pose.bones["spine"]
+        spine.rotation_quaternion = Quaternion((1.0, 0.0, 0.0), np.radians(30.0))
+        spine.keyframe_insert("rotation_quaternion", frame=frame)
+    bow = np.degrees(np.arccos(_upright(played(source))))
+    base = make_body("Other", body)
+    walk(base, body)
+    before = played(base)
+    for part, leans in (("TRUNK", bow), ("LEGS", 0.0)):
+        select(source, base)
+        base.octo_motion.splicing.splices.clear()
+        OPERATORS.splice_add(part=part)
+        item = base.octo_motion.splicing.splices[0]
+        item.with_travel, item.ease_in, item.ease_out = part == "LEGS", 0, 0
+        OPERATORS.splice_build()
+        after = played(base)
+        assert np.abs(np.degrees(np.arccos(_upright(after))) - leans).max() < 1.0
+        if part == "TRUNK":
+            for bone in ("hips", "thigh.L", "foot.R"):
+                off = joint(after, bone) - joint(before, bone)
+                assert np.abs(off).max() < 1e-4
+        else:
+            ways = [joint(each, "hips") for each in (played(source), after)]
+            size = body.leg / BODIES["like it"].leg
+            ours, theirs = (way[-1] - way[0] for way in ways[::-1])
+            assert np.abs(ours - size * theirs).max() < 0.01 * np.linalg.norm(ours)
+
+
+def _upright(recording: Recording) -> Floats:
+    """Cosine of how far the neck is off the vertical through the hips."""
+    trunk = joint(recording, "neck") - joint(recording, "hips")
+    return np.clip(trunk[:, 2] / np.linalg.norm(trunk, axis=1), -1.0, 1.0)
 
 
 def test_location_keys_of_a_part_are_the_clips() -> None:

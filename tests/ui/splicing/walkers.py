@@ -34,6 +34,8 @@ class Body:
     toes: bool = True
     loose_feet: bool = False
     """Whether feet hang on the root, as controls have placed them."""
+    hips_on_torso: bool = False
+    """Whether a torso of one bone, which begins at the hips, carries them."""
     scale: float = 1.0
     """Of the armature object; its bones are as much smaller."""
 
@@ -49,6 +51,7 @@ BODIES = {
     "big head, no collar bones": Body(0.3, 0.25, head=0.7, clavicles=False),
     "no toes": Body(0.35, 0.4, 0.07, toes=False),
     "loose feet": Body(0.25, 0.35, 0.06, toes=False, loose_feet=True),
+    "hips on a torso": Body(0.2, 0.2, 0.06, clavicles=False, hips_on_torso=True),
     "a hundred times as large": Body(0.5, 0.45, 0.1, 0.2, scale=100.0),
 }
 
@@ -65,6 +68,10 @@ def _heads(body: Body) -> dict[str, tuple[str, tuple[float, float, float]]]:
         "neck": ("chest", (0.0, 0.0, top + 0.52)),
         "head": ("neck", (0.0, 0.0, top + 0.6)),
     }
+    if body.hips_on_torso:
+        bones["chest"] = ("root", bones["hips"][1])
+        bones["hips"] = ("chest", bones["hips"][1])
+        del bones["spine"]
     for side, sign in (("L", 1.0), ("R", -1.0)):
         x = sign * body.hips
         if body.clavicles:
@@ -90,15 +97,15 @@ def make_body(name: str, body: Body) -> Any:
     bpy.context.view_layer.objects.active = armature
     bpy.ops.object.mode_set(mode="EDIT")
     bones = _heads(body)
-    for bone, (parent, place) in bones.items():
+    for bone, (_, place) in bones.items():
         made = armature.data.edit_bones.new(bone)
         below = [each for each, (above, _) in bones.items() if above == bone]
         end = bones[below[0]][1] if len(below) == 1 else (place[0], place[1], place[2] + body.head)
         if not below and bone.startswith(("foot", "toe")):
             end = (place[0], place[1] - 0.07, place[2])
         made.head, made.tail = Vector(place) / body.scale, Vector(end) / body.scale
-        if parent:
-            made.parent = armature.data.edit_bones[parent]
+    for bone, (parent, _) in bones.items():
+        armature.data.edit_bones[bone].parent = armature.data.edit_bones.get(parent)
     bpy.ops.object.mode_set(mode="OBJECT")
     return armature
 
@@ -153,9 +160,14 @@ def walk(armature: Any, body: Body, cycles: int = 3) -> Any:
         for bone in armature.pose.bones:
             bone.rotation_mode = "QUATERNION"
             bone.keyframe_insert("rotation_quaternion", frame=frame)
-            if bone.name == "hips" or (body.loose_feet and bone.name.startswith("foot")):
+            if bone.name == _carrier(body) or (body.loose_feet and bone.name.startswith("foot")):
                 bone.keyframe_insert("location", frame=frame)
     return action
+
+
+def _carrier(body: Body) -> str:
+    """The bone that carries the whole."""
+    return "chest" if body.hips_on_torso else "hips"
 
 
 def _pose(armature: Any, body: Body, phase: float, stride: float) -> None:
@@ -164,7 +176,7 @@ def _pose(armature: Any, body: Body, phase: float, stride: float) -> None:
     swing = 0.3 * np.sin(2.0 * np.pi * phase)
     for bone in armature.pose.bones:
         bone.matrix_basis = Matrix()
-    _turn(armature, "hips", 0.0, hips * size)
+    _turn(armature, _carrier(body), 0.0, hips * size)
     for side, offset in (("L", 0.0), ("R", 0.5)):
         foot = step(body, phase + offset, stride)
         foot = Step(foot.y + offset * stride, foot.z, foot.pitch)

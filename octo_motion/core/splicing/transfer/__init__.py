@@ -15,6 +15,7 @@ from .parts import (
 )
 from .pose_doubts import reference_doubts
 from .reference_pose import ReferencePose, find_reference_pose
+from .rehung import whole_limbs
 from .retarget import MappedClip
 from .splice import (
     LimbGoal,
@@ -63,4 +64,5 @@ __all__ = [
     "retarget_clip",
     "retargeting_clip",
     "suggest_timings",
+    "whole_limbs",
 ]

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Limbs whose last bones hang on nothing: feet of game characters that were placed by controls.
+"""Bodies whose bones hang on each other otherwise than their limbs do.
 
-Such a foot goes where its leg ends all the same. So it is taken off what carries it and hung on
-the limb before anything is carried over, and put back afterwards: its keys then say the same of
-where it is.
+Feet of game characters that were placed by controls hang on nothing, and go where their legs end
+all the same. A torso of one bone may carry the hips, though it turns about them. So these bones are
+hung where they belong before anything is carried over, and put back afterwards: their keys then say
+the same of where they are.
 """
 
 from __future__ import annotations
@@ -74,8 +75,12 @@ class Rehung:
             turned, moved = _hung(
                 now, place, hung_on, inherits=self.skeleton.inherits_rotation[bone]
             )
-            still = np.all(now.orientation(place) == was.orientation(place), axis=-1)
-            still &= np.all(now.head(place) == was.head(place), axis=-1)
+            # What carries it counts as well: it may leave a bone behind that stays.
+            kept = [each for each in (place, hung_on) if each >= 0]
+            still = np.ones(len(given), dtype=bool)
+            for each in kept:
+                still &= np.all(now.orientation(each) == was.orientation(each), axis=-1)
+                still &= np.all(now.head(each) == was.head(each), axis=-1)
             for array, own, new in (
                 (result.rotations, given.rotations, turned),
                 (result.locations, given.locations, moved),
@@ -112,7 +117,9 @@ class Rehung:
 
 
 def whole_limbs(mapped: MappedClip) -> tuple[MappedClip, Rehung | None]:
-    """A mapped clip with its limbs made whole, and what did it: itself and none if they are."""
+    """A mapped clip with its limbs and trunk made whole, and what did it: itself and none if they
+    are.
+    """
     hung = find_rehung(mapped.clip, mapped.landmarks)
     if hung is None:
         return mapped, None
@@ -120,7 +127,9 @@ def whole_limbs(mapped: MappedClip) -> tuple[MappedClip, Rehung | None]:
 
 
 def find_rehung(clip: Clip, landmarks: Landmarks | None) -> Rehung | None:
-    """The clip's limbs made whole; none if they are, or if what is loose does not end them."""
+    """The clip's limbs and trunk made whole; none if they are, or if what is loose does not end
+    them.
+    """
     if landmarks is None or not len(clip):
         return None
     skeleton = clip.skeleton
@@ -143,7 +152,27 @@ def find_rehung(clip: Clip, landmarks: Landmarks | None) -> Rehung | None:
             ):
                 parents[lower] = upper
     parents = {lower: upper for lower, upper in parents.items() if _ends_at(clip, upper, lower)}
+    parents |= _on_hips(skeleton, index)
     return Rehung(skeleton, parents) if parents else None
+
+
+def _on_hips(skeleton: Skeleton, index: dict[str, int]) -> dict[int, int]:
+    """New parents of hips and of a trunk that carries them, if it turns about them."""
+    hips, chest = index.get("hips", -1), index.get("chest", -1)
+    arms = [index.get(f"upper_arm.{side}", -1) for side in "LR"]
+    if min(hips, chest, *arms) < 0 or chest not in skeleton.ancestors(hips):
+        return {}
+    above = skeleton.ancestors(hips)
+    # From the hips up to the chest: each hangs on the one before it.
+    path = [hips, *above[: above.index(chest) + 1]]
+    shoulders = skeleton.heads[arms].mean(axis=0)
+    low, high = (
+        float(np.linalg.norm(place - skeleton.heads[chest]))
+        for place in (skeleton.heads[hips], shoulders)
+    )
+    if low > high or any(skeleton.connected[bone] for bone in path[:-1]):
+        return {}
+    return {hips: skeleton.parents[chest]} | dict(zip(path[1:], path[:-1], strict=True))
 
 
 def _ends_at(clip: Clip, upper: int, lower: int) -> bool:
