@@ -12,6 +12,7 @@ from octo_motion.core.locomotion.clearance.corrections import DEEP
 from octo_motion.ui.locomotion.operators import generate as live
 from octo_motion.ui.locomotion.settings.properties import locomotion_settings
 from tests.bench.apart import add_bumps
+from tests.referee.scenes import build
 from tests.ui.made import Made, prepare
 from tests.ui.rig import Octopus, keys
 
@@ -94,6 +95,15 @@ def test_arms_make_way_without_a_jump_at_any_frame_rate() -> None:
         assert kept["OVERLAP"] <= DEEP
         # Nobody is quicker for it: 10.4° and 5.4°, where there were 14.9° and 9.3°.
         assert kept["TURN"] <= 1.05 * without["TURN"]
+
+
+def test_arms_that_swap_places_do_not_go_through_each_other_uphill_or_on_bumps() -> None:
+    # Uphill, up stairs and on bumps they were left 1.4, 2.3 and 1.3 radii deep in each other.
+    for ground, most in (("slope", 0.5), ("stairs", 0.4), ("bumps", 0.25)):
+        scene = build("walk", ground)
+        told = figures(computed(scene.armature, keep_apart=True))
+        assert told["OVERLAP"] <= most
+        assert told["TURN"] <= np.radians(28.0)
 
 
 def test_what_lives_keeps_apart_like_what_is_generated(octopus: Any) -> None:

@@ -93,7 +93,7 @@ def separating_arms(
     ground: Ground | None,
     scale: float,
     frames_per_cycle: float,
-    rate: float,
+    most: float,
     opened: Opened | None = None,
     cyclic: bool = False,
 ) -> Generator[float, None, Floats | None]:
@@ -110,7 +110,7 @@ def separating_arms(
         ground: what they walk on, if anything.
         scale: metres of the armature's unit.
         frames_per_cycle: of the gait: the shorter, the quicker arms make way.
-        rate: frames per second.
+        most: radians that an arm which makes way may turn in a frame.
         opened: where arms stand round a body that swims as it lies, none for others.
         cyclic: whether the last frame is the first again.
     """
@@ -123,7 +123,7 @@ def separating_arms(
         volume.still,
         floor=_floor(travel, ground, scale),
         width=width_of(frames_per_cycle),
-        rate=rate,
+        most=most,
         cyclic=cyclic,
     )
     return crowd.turned(rotations, moved)

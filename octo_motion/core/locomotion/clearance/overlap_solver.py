@@ -32,9 +32,9 @@ from .capsule_overlap import Capsules, Crowd, Touches, Touching, all_of, aside, 
 
 _DAMPED: Final = 0.02
 """Stiffness of a segment, in squares of its length …"""
-_EVEN: Final = 0.1
-"""… and of each joint between two, likewise. At 0.05 Curl has a jerk of 0.085 instead of 0.067; of
-either twice or half as much changes overlaps by less than 0.02 radii."""
+_EVEN: Final = 0.2
+"""… and of each joint between two, likewise. At 0.1 arms that swap places on bumps turn by 27° in a
+frame instead of 21°, and overlap by 1.1 radii instead of 0.2."""
 _BOLD: Final = 0.5
 """Radians that a segment turns at most. At 1 Curl has a jerk of 0.077 instead of 0.067."""
 _TINY: Final = 1e-12
@@ -116,14 +116,12 @@ _STEPS: Final = 4
 """Newton's steps that draw an arm back to where it holds on."""
 _TORN: Final = 2e-5
 """Arm lengths by which an arm may miss that place; one that misses it more is left as it was."""
-_HOPELESS: Final = (0.5, 1.0)
-"""Depths, as shares of the thinner radius, between which arms are left in each other."""
+_HOPELESS: Final = (1.0, 1.25)
+"""Shares of how deep arms were in each other before, between which they are left as they were …"""
+_SHALLOW: Final = 0.5
+"""… where they are deeper than this share of the thinner radius."""
 _MOSTLY: Final = 0.5
 """Share of all frames from which on two capsules that overlap belong together."""
-_UNSEEN: Final = 0.4 * 24.0
-"""Radians a second that an arm may turn to make way, or as fast as anything did before: a walk has
-as much. A fifth faster than before, arms that hold on for long turn by 20° in a 48th of a second
-instead of 13°."""
 _REPEATS: Final = 3
 """How often arms that could not make way well are looked for."""
 _ARMS_AT_ONCE: Final = 512
@@ -148,7 +146,7 @@ def parting(
     *,
     floor: Floor | None,
     width: int,
-    rate: float,
+    most: float,
     cyclic: bool = False,
 ) -> Generator[float, None, Floats | None]:
     """Joints (frames, arms, joints, 3) of arms that have made way; none if nobody has to. In steps
@@ -156,8 +154,9 @@ def parting(
 
     The result at a frame hangs on the frames within some reach of it, and on no state: the same
     motion gives the same result. Parts of the body that are ``still`` have one frame each;
-    ``width`` is that of the means over frames that make it smooth (``smoothing.blurred``), of which
-    there are ``rate`` to a second; cyclic, the last frame is the first again.
+    ``width`` is that of the means over frames that make it smooth (``smoothing.blurred``); nobody
+    makes way by turns of more than ``most`` radians in a frame, or than there were before. Cyclic,
+    the last frame is the first again.
     """
     every = np.arange(len(crowd.joints))
     if not len(every):
@@ -179,7 +178,7 @@ def parting(
     crowded = _Parting(
         *(crowd, touching, np.flatnonzero(around), floor),
         width=width,
-        unseen=_UNSEEN / rate,
+        most=most,
         cyclic=cyclic,
     )
     yield 0.0
@@ -215,11 +214,11 @@ class _Parting:
         floor: Floor | None,
         *,
         width: int,
-        unseen: float,
+        most: float,
         cyclic: bool,
     ) -> None:
         self._crowd, self._touching, self._floor = crowd, touching, floor
-        self._around, self._unseen = around, unseen
+        self._around, self._most = around, most
         self._width, self._cyclic = width, cyclic
         self._joints = crowd.joints.copy()
         steps = np.diff(crowd.joints, axis=2)
@@ -228,6 +227,7 @@ class _Parting:
         self._directions = self._before.copy()
         self._length = float(self._lengths.sum(axis=2).mean())
         self._scale = float(crowd.radii.mean())
+        self._depths_before = np.zeros(crowd.in_contact.shape[:2])
         lies = crowd.in_contact.any(axis=2)
         self._held = np.where(lies, 1.0, self._covered(lies.astype(np.float64), brief=True))
         self._anchor = _anchors(crowd.in_contact)
@@ -241,6 +241,8 @@ class _Parting:
         rounds = _ROUNDS + _REPEATS
         for number in range(_ROUNDS):
             asked = self._asked()
+            if not number:
+                self._depths_before = self._depths(asked.touches)
             yield number / rounds
             sunk = self._room.min() < -1e-4 * self._length
             if np.max(asked.touches.depth, initial=0.0) <= _DONE and not sunk:
@@ -447,14 +449,13 @@ class _Parting:
 
     def _hopeless(self, touches: Touches) -> Floats:
         """Which arms (frames, arms) could not make way, or not without a jump, 0…1."""
-        frames, arms = self._held.shape
-        worst = np.zeros((frames, arms + int(touches.arms[1].max(initial=0)) + 1))
-        for which in (0, 1):
-            np.maximum.at(worst, (touches.frame, touches.arms[which]), touches.depth)
+        around = blur_reach(self._width)
+        before = widened(self._depths_before, around, cyclic=self._cyclic)
+        before = np.maximum(before, _SHALLOW)
         low, high = _HOPELESS
-        result = smooth_step((worst[:, :arms] - low) / (high - low))
+        result = smooth_step((self._depths(touches) / before - low) / (high - low))
         changed = self._changed()
-        most = max(float(self._turns_before.max(initial=0.0)), self._unseen)
+        most = max(float(self._turns_before.max(initial=0.0)), self._most)
         swift = self._turns_before > most
         # Between two frames of which neither has changed it turns as it did.
         anew = np.nonzero(changed[:-1] | changed[1:])
@@ -463,6 +464,14 @@ class _Parting:
         result[1:][swift] = result[:-1][swift] = 1.0
         result[self._room.min(axis=2) < -TOLERATED * self._length] = 1.0
         return np.where(changed | (result < 1.0), result, 0.0)
+
+    def _depths(self, touches: Touches) -> Floats:
+        """How deep (frames, arms) arms are in anything."""
+        frames, arms = self._held.shape
+        worst = np.zeros((frames, arms + int(touches.arms[1].max(initial=0)) + 1))
+        for which in (0, 1):
+            np.maximum.at(worst, (touches.frame, touches.arms[which]), touches.depth)
+        return worst[:, :arms]
 
     def _changed(self) -> np.ndarray:
         """Which arms (frames, arms) have made way."""
@@ -510,24 +519,9 @@ def _within(before: Floats, after: Floats, free: Floats) -> Floats:
 
 
 def _turns(first: Floats, second: Floats) -> Floats:
-    """How far (…) a segment turns at most against the one before it, radians, from directions
-    (…, segments, 3) at a frame to those at the next.
-    """
-    one, other = np.moveaxis(first, -1, 0), np.moveaxis(second, -1, 0)
-    # The one before, turned the shortest way to where it is a frame later, takes the next along.
-    (sx, sy, sz), (ex, ey, ez), (x, y, z) = one[..., :-1], other[..., :-1], one[..., 1:]
-    ax, ay, az = sy * ez - sz * ey, sz * ex - sx * ez, sx * ey - sy * ex
-    beyond = 1.0 / np.maximum(1.0 + sx * ex + sy * ey + sz * ez, 1e-6)
-    cx, cy, cz = ay * z - az * y, az * x - ax * z, ax * y - ay * x
-    taken = (
-        x + cx + (ay * cz - az * cy) * beyond,
-        y + cy + (az * cx - ax * cz) * beyond,
-        z + cz + (ax * cy - ay * cx) * beyond,
-    )
-    left = [end - start for end, start in zip(other[..., 1:], taken, strict=True)]
-    squares = left[0] * left[0] + left[1] * left[1] + left[2] * left[2]
-    own = _length(second[..., 0, :] - first[..., 0, :])
-    return np.maximum(own, np.sqrt(squares.max(axis=-1, initial=0.0)))
+    """How far (…) a segment turns at most, radians, from directions (…, segments, 3) to others."""
+    chord = _length(second - first).max(axis=-1, initial=0.0)
+    return 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
 
 
 def _anchors(in_contact: np.ndarray) -> np.ndarray:

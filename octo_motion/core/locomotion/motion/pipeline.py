@@ -634,7 +634,7 @@ def _separate(
         ground=_underfoot(plan),
         scale=job.creature.scale,
         frames_per_cycle=plan.stride * plan.pace.mean,
-        rate=plan.stride * job.timing.rate,
+        most=fastest_turn(plan.stride * job.timing.rate, np.inf),
         opened=_opened(plan, len(arms.rotations), swimming),
         cyclic=cyclic,
     )

@@ -76,7 +76,7 @@ def apart(bulk: BodyVolume, rotations: Floats) -> Floats | None:
         ground=None,
         scale=1.0,
         frames_per_cycle=48.0,
-        rate=24.0,
+        most=0.49,
     )
     return finished(steps)
 

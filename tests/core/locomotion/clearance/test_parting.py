@@ -26,7 +26,7 @@ from octo_motion.core.steps import finished
 
 SEEDS = st.integers(0, 2**31)
 UP = np.array([0.0, 0.0, 1.0])
-FRAMES, JOINTS, RADIUS, WIDTH, RATE = 120, 9, 0.04, 2, 24.0
+FRAMES, JOINTS, RADIUS, WIDTH, MOST = 120, 9, 0.04, 2, np.radians(28.0)
 
 
 # --- One pair -----------------------------------------------------------------------------------
@@ -256,14 +256,14 @@ def over_lying() -> Crowd:
 @pytest.mark.parametrize("group", [beside(), over_lying()], ids=["in the air", "lying"])
 def test_arms_that_meet_make_way(group: Crowd) -> None:
     assert depth(group, group.joints).max() > 0.8
-    moved = parted(group, (), floor=Level(), width=WIDTH, rate=RATE)
+    moved = parted(group, (), floor=Level(), width=WIDTH, most=MOST)
     assert moved is not None
     assert depth(group, moved).max() <= 0.1
 
 
 @pytest.mark.parametrize("group", [beside(), over_lying()], ids=["in the air", "lying"])
 def test_nothing_stretches_no_root_moves_and_nobody_is_pushed_into_the_ground(group: Crowd) -> None:
-    moved = parted(group, (), floor=Level(), width=WIDTH, rate=RATE)
+    moved = parted(group, (), floor=Level(), width=WIDTH, most=MOST)
     assert moved is not None
     lengths = np.linalg.norm(np.diff(moved, axis=2), axis=-1)
     np.testing.assert_allclose(lengths, 1.0 / (JOINTS - 1), rtol=1e-9)
@@ -274,14 +274,14 @@ def test_nothing_stretches_no_root_moves_and_nobody_is_pushed_into_the_ground(gr
 
 def test_what_lies_on_the_ground_stays_where_it_lies() -> None:
     group = over_lying()
-    moved = parted(group, (), floor=Level(), width=WIDTH, rate=RATE)
+    moved = parted(group, (), floor=Level(), width=WIDTH, most=MOST)
     assert moved is not None
     assert np.abs(moved - group.joints)[group.in_contact].max() < 1e-9
 
 
 def test_arms_make_way_in_time_and_not_in_a_jump() -> None:
     group = beside()
-    moved = parted(group, (), floor=None, width=WIDTH, rate=RATE)
+    moved = parted(group, (), floor=None, width=WIDTH, most=MOST)
     assert moved is not None
     aside_by = moved - group.joints
     assert np.abs(aside_by).max() > RADIUS
@@ -291,7 +291,7 @@ def test_arms_make_way_in_time_and_not_in_a_jump() -> None:
 
 def test_arms_make_way_as_early_as_they_can_and_then_are_where_they_were() -> None:
     group = beside()
-    moved = parted(group, (), floor=None, width=WIDTH, rate=RATE)
+    moved = parted(group, (), floor=None, width=WIDTH, most=MOST)
     assert moved is not None
     met = np.flatnonzero(depth(group, group.joints) > 0.0)
     early, late = met[0] - 5 * blur_reach(WIDTH), met[-1] + 5 * blur_reach(WIDTH)
@@ -301,7 +301,7 @@ def test_arms_make_way_as_early_as_they_can_and_then_are_where_they_were() -> No
 
 def test_a_part_of_the_motion_is_made_like_the_whole() -> None:
     group = beside()
-    whole = parted(group, (), floor=None, width=WIDTH, rate=RATE)
+    whole = parted(group, (), floor=None, width=WIDTH, most=MOST)
     some = slice(10, 110)
     part = parted(
         replace(
@@ -314,7 +314,7 @@ def test_a_part_of_the_motion_is_made_like_the_whole() -> None:
         (),
         floor=None,
         width=WIDTH,
-        rate=RATE,
+        most=MOST,
     )
     assert whole is not None
     assert part is not None
@@ -338,7 +338,7 @@ def test_arms_that_open_otherwise_than_they_lie_belong_there_while_they_do() -> 
 def test_arms_that_keep_apart_are_not_touched() -> None:
     still = np.zeros(FRAMES)
     group = crowd(straight(still, 0.1, at=0.3), straight(still, 0.1, at=-0.3))
-    assert parted(group, (), floor=Level(), width=WIDTH, rate=RATE) is None
+    assert parted(group, (), floor=Level(), width=WIDTH, most=MOST) is None
 
 
 def test_what_an_arm_comes_near_to_as_it_makes_way_is_seen() -> None:
@@ -362,7 +362,7 @@ def test_what_an_arm_comes_near_to_as_it_makes_way_is_seen() -> None:
 def test_arms_that_are_busy_stay_and_the_other_makes_way() -> None:
     group = beside()
     group.kept[:, 1] = True
-    moved = parted(group, (), floor=None, width=WIDTH, rate=RATE)
+    moved = parted(group, (), floor=None, width=WIDTH, most=MOST)
     assert moved is not None
     np.testing.assert_array_equal(moved[:, 1], group.joints[:, 1])
     assert depth(group, moved).max() <= 0.1
@@ -381,14 +381,14 @@ def crossing(frames: slice) -> Crowd:
 def test_arms_that_cannot_be_parted_move_as_before() -> None:
     group = crossing(slice(40, 80))
     assert depth(group, group.joints).max() > 1.0
-    moved = parted(group, (), floor=Level(), width=WIDTH, rate=RATE)
+    moved = parted(group, (), floor=Level(), width=WIDTH, most=MOST)
     assert moved is not None
     np.testing.assert_allclose(moved, group.joints, atol=1e-9)
 
 
 def test_what_overlaps_nearly_all_the_while_is_the_creature_s_own_form() -> None:
     group = crossing(slice(5, FRAMES))
-    assert parted(group, (), floor=Level(), width=WIDTH, rate=RATE) is None
+    assert parted(group, (), floor=Level(), width=WIDTH, most=MOST) is None
 
 
 def test_an_arm_stays_out_of_the_body() -> None:
@@ -406,6 +406,6 @@ def test_an_arm_stays_out_of_the_body() -> None:
         return float(measure_overlap([own], [tiled]).depths.max())
 
     assert deep(before.joints) > 1.0
-    moved = parted(group, (body,), floor=None, width=WIDTH, rate=RATE)
+    moved = parted(group, (body,), floor=None, width=WIDTH, most=MOST)
     assert moved is not None
     assert deep(moved[:, 0]) <= 0.1
