@@ -201,8 +201,8 @@ def _resting(armature: bpy.types.Object) -> Source:
 
 def _own_motion(armature: bpy.types.Object, reader: ClipReader) -> Source | None:
     """A motion of the armature's own, none if there is none: the one that it has for this, the
-    base of its splices, one in which it stands by its name, its action, or another with a slot of
-    its name. What was retargeted tells nothing of it.
+    base of its splices, one in which it stands by its name, its action, or another with its slot.
+    What was retargeted tells nothing of it.
     """
     settings = splicing_settings(armature)
     own = own_action(armature)
@@ -211,8 +211,13 @@ def _own_motion(armature: bpy.types.Object, reader: ClipReader) -> Source | None
         choices.append((settings.retarget.standing, ""))
     if settings.base is not None:
         choices.append((settings.base, settings.base_slot))
-    identifier = f"OB{armature.name}"
-    others = [(each, identifier) for each in actions_for(armature) if identifier in each.slots]
+    slots = _own_slots(armature)
+    others = [
+        (each, slot.identifier)
+        for each in actions_for(armature)
+        for slot in each.slots
+        if slot.identifier in slots
+    ]
     choices += sorted([own, *others] if own is not None else others, key=_busy)
     for action, slot in choices:
         if is_generated(action):
@@ -222,6 +227,19 @@ def _own_motion(armature: bpy.types.Object, reader: ClipReader) -> Source | None
             if source.landmarks is not None:
                 return source
     return None
+
+
+def _own_slots(armature: bpy.types.Object) -> set[str]:
+    """Identifiers of slots that are an armature's: that of its name, and that of its action, which
+    files call as they like, unless another armature plays one of that name.
+    """
+    found = {f"OB{armature.name}"}
+    own = own_action(armature)
+    if own is not None and own[1]:
+        others = [each for each in bpy.data.objects if each.type == "ARMATURE" and each != armature]
+        playing = {played[1] for each in others if (played := own_action(each)) is not None}
+        found |= {own[1]} - playing
+    return found
 
 
 def _busy(choice: tuple[bpy.types.Action, str]) -> bool:

@@ -175,6 +175,25 @@ def test_a_body_whose_rest_pose_leans_stands_as_its_clip_does(degrees: float) ->
     )
 
 
+def test_a_body_stands_as_in_an_idle_action_whatever_its_slots_are_called() -> None:
+    """Files call them as they like; the object is called after the file when it is imported."""
+    _, hero = walker_and("like it")
+    body = BODIES["like it"]
+    for name, height in (("Idle", 0.0), ("Wall Slide", 0.5)):
+        action = bpy.data.actions.new(name)
+        data = hero.animation_data_create()
+        data.action = action
+        data.action_slot = action.slots.new("OBJECT", "Skeleton")
+        for frame in (1, 24):
+            hero.pose.bones["hips"].location = (0.0, height, 0.0)
+            hero.pose.bones["hips"].keyframe_insert("location", frame=frame)
+    assert hero.animation_data.action_slot.identifier == "OBSkeleton"
+    OPERATORS.retarget()
+    recording = played(hero)
+    for rows in holds(recording.frames, "L", ball=False):
+        assert np.abs(joint(recording, "foot.L")[rows, 2] - body.ankle).max() < 0.01 * body.leg
+
+
 @pytest.mark.parametrize("degrees", [0.0, 60.0])
 def test_that_a_head_turned_aside_counts_as_facing_ahead_is_told(
     degrees: float, capfd: pytest.CaptureFixture[str]
