@@ -7,6 +7,19 @@ from collections.abc import Generator
 from typing import Any, TypeVar
 
 _Outcome = TypeVar("_Outcome")
+_Share = TypeVar("_Share")
+
+
+def evenly(
+    steps: Generator[Any, None, _Outcome], share: _Share
+) -> Generator[_Share, None, _Outcome]:
+    """The same steps, each of which yields one share that is done."""
+    while True:
+        try:
+            next(steps)
+        except StopIteration as last:
+            return last.value
+        yield share
 
 
 def finished(steps: Generator[Any, None, _Outcome]) -> _Outcome:

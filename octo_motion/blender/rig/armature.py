@@ -124,19 +124,24 @@ def read_skeleton(armature: bpy.types.Object) -> Skeleton:
             phrase("'{armature}' has no bones.", armature=armature.name),
             "Add bones, or choose another armature.",
         )
-    index = {bone.name: number for number, bone in enumerate(bones)}
-    matrices = np.array([bone.matrix_local for bone in bones], dtype=np.float64)
+    names = tuple(bone.name for bone in bones)
+    index = {name: number for number, name in enumerate(names)}
+    # Blender has them as they lie in memory: column by column, in single precision.
+    columns = np.empty((len(bones), 4, 4), dtype=np.float32)
+    data.bones.foreach_get("matrix_local", columns.ravel())
+    matrices = columns.swapaxes(1, 2).astype(np.float64)
     if not np.isfinite(matrices).all():
         raise RigError(
             phrase("'{armature}' has bones at undefined positions.", armature=armature.name),
             "Repair its rest pose.",
         )
     lengths = np.array([bone.length for bone in bones])
-    parents = tuple(index[bone.parent.name] if bone.parent else -1 for bone in bones)
+    above = [bone.parent for bone in bones]
+    parents = tuple(-1 if each is None else index[each.name] for each in above)
     driven = _driven_bones(armature)
     weighted = {group.name for item in deformed_meshes(armature) for group in item.vertex_groups}
     skeleton = Skeleton(
-        names=tuple(bone.name for bone in bones),
+        names=names,
         parents=parents,
         rest_matrices=matrices,
         lengths=without_made_up_scale(lengths, matrices[:, :3, 3], parents),

@@ -9,6 +9,7 @@ from a copy of it by what it was once called: of a copy, the other one is still 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -55,11 +56,9 @@ def markers(armature: bpy.types.Object, once: str = "") -> list[bpy.types.Object
     names = {armature.name}
     if once and bpy.data.objects.get((once, None)) is None:
         names.add(once)
-    found = [
-        item
-        for item in bpy.data.objects
-        if item.type == "EMPTY" and _own(item).armature in names and item.users_scene
-    ]
+    # Once for all of them: Blender looks through all scenes for each.
+    there = {item for scene in bpy.data.scenes for item in scene.objects if item.type == "EMPTY"}
+    found = [item for item in there if _own(item).armature in names]
     return sorted(found, key=lambda item: item.name)
 
 
@@ -70,19 +69,21 @@ def read_markers(armature: bpy.types.Object, once: str = "") -> dict[tuple[str, 
     """
     contacts: dict[tuple[str, int], Contact] = {}
     for item in markers(armature, once):
-        own = _own(item)
-        place = np.array(item.matrix_world.translation, dtype=np.float64)
-        heading = _heading(item)
-        moved = np.abs(place - np.array(own.position)).max() > _MOVED * item.empty_display_size
-        turn = np.mod(heading - own.heading + np.pi, 2.0 * np.pi) - np.pi
+        own, world = _own(item), item.matrix_world
+        place, put, known = world.translation, own.position, own.heading
+        far = max(abs(here - there) for here, there in zip(place, put, strict=True))
+        moved = far > _MOVED * item.empty_display_size
+        heading = _heading(world)
+        turned = abs((heading - known + math.pi) % (2.0 * math.pi) - math.pi) > _MOVED
+        arm, cycle = own.arm, own.cycle
         contacts.setdefault(
-            (own.arm, own.cycle),
+            (arm, cycle),
             Contact(
-                own.arm,
-                own.cycle,
-                place if moved else np.array(own.position, dtype=np.float64),
-                heading if abs(turn) > _MOVED else own.heading,
-                locked=own.locked or bool(moved) or abs(turn) > _MOVED,
+                arm,
+                cycle,
+                np.array(place if moved else put, dtype=np.float64),
+                heading if turned else known,
+                locked=own.locked or moved or turned,
                 shift=own.shift,
             ),
         )
@@ -145,13 +146,12 @@ def _write(item: bpy.types.Object, armature: bpy.types.Object, contact: Contact)
     item.matrix_world = Matrix.Translation(contact.position.tolist()) @ turn
     # As single precision has them: what is read back must not look moved.
     own.position = item.matrix_world.translation
-    own.heading = _heading(item)
+    own.heading = _heading(item.matrix_world)
 
 
-def _heading(item: bpy.types.Object) -> float:
-    """Which way a marker points, radians about world Z from +X."""
-    along = np.array(item.matrix_world, dtype=np.float64)[:2, 1]
-    return float(np.arctan2(along[1], along[0]))
+def _heading(world: Matrix) -> float:
+    """Which way a marker with this matrix points, radians about world Z from +X."""
+    return math.atan2(world[1][1], world[0][1])
 
 
 def _remove(items: Iterable[bpy.types.Object]) -> None:

@@ -18,11 +18,14 @@ import bpy
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...core.content_cache import ContentCache, content_key
 from ...core.errors import RouteError
 from ...core.locomotion.path import Route, s_bend
 from ...core.phrases import phrase
 from ...core.rotations import Floats, normalized
 from ..rig import armature_data, world_of
+
+_routes: Final[ContentCache[Route]] = ContentCache(8)
 
 LONGEST: Final = -1
 """Index that stands for the longest spline of a curve."""
@@ -139,6 +142,10 @@ class _Line:
     knots: Floats | None = None
 
     def route(self, world: Floats) -> Route:
+        """The same in the world; what was worked out of the same one before stays with it."""
+        return _routes.get(content_key(self, world), lambda: self._route(world))
+
+    def _route(self, world: Floats) -> Route:
         moved = self.points @ world[:3, :3].T + world[:3, 3]
         if self.kind == "BEZIER":
             return Route.bezier(_bezier_segments(moved, self.cyclic), cyclic=self.cyclic)

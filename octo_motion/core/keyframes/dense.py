@@ -9,6 +9,7 @@ has a corner, and the two handles of that span are what it needs.
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from typing import Final
 
 import numpy as np
@@ -28,11 +29,14 @@ _ENOUGH: Final = 1e-8
 """Share of the residual's square that is left when they end."""
 
 
-def dense_keys(times: Floats, limb: Limb, every: int, *, loops: bool = False) -> list[BezierKeys]:
+def dense_keys(
+    times: Floats, limb: Limb, every: int, *, loops: bool = False
+) -> Generator[None, None, list[BezierKeys]]:
     """A key on each frame, of the motion's own values, where times (moments,), at least two, have a
     frame at ``every`` so many of them, from the first to the last.
 
     The limb is that of all moments. In a loop the motion goes on from its last frame to its first.
+    In steps.
     """
     at = np.arange(0, len(times), every)
     targets = np.stack(
@@ -40,24 +44,28 @@ def dense_keys(times: Floats, limb: Limb, every: int, *, loops: bool = False) ->
         axis=1,
     )
     spans = _Spans(times, targets, at)
+    yield
     slopes = spans.evened(np.gradient(targets, times, axis=2).take(at, axis=2))
     if loops:
         met = ~LinearModel(limb).turns_at_the_seam(at)
         slopes[:, met, 0] = slopes[:, met, -1] = 0.5 * (slopes[:, met, 0] + slopes[:, met, -1])
     out, into = slopes[..., :-1].copy(), slopes[..., 1:].copy()
     smooth = np.ones(slopes.shape[1:], dtype=bool)
+    yield
     own, joint = Residuals(limb).measure(
         [
             spans.played(out, into)[: track.values.shape[1], place].T
             for place, track in enumerate(limb.tracks)
         ]
     )
+    yield
     broken = np.maximum.reduceat(np.maximum(own, joint), at[:-1], axis=1) > 1.0
     tracks, number = np.nonzero(broken)
     out[:, tracks, number], into[:, tracks, number] = spans.cornered(out, into, tracks, number)
     smooth[tracks, number] = smooth[tracks, number + 1] = False
     if loops:
         smooth[:, [0, -1]] = False
+    yield
     third = np.diff(times[at]) / 3.0
     result = []
     for place, track in enumerate(limb.tracks):

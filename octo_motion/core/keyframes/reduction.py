@@ -23,7 +23,7 @@ import numpy as np
 from ..errors import SettingsError
 from ..processes import computed_apart, helpers
 from ..rotations import Floats
-from ..steps import finished
+from ..steps import evenly, finished
 from .channels import BezierKeys, Booleans
 from .dense import dense_keys
 from .key_times import Choice
@@ -174,8 +174,8 @@ def _dense(
     """A key wherever there may be one, of the motion's own values."""
     result: list[list[BezierKeys]] = []
     for limb in limbs:
-        yield len(result) / len(limbs)
-        result.append(dense_keys(times, limb, every, loops=loops))
+        done = len(result) / len(limbs)
+        result.append((yield from evenly(dense_keys(times, limb, every, loops=loops), done)))
     return result
 
 

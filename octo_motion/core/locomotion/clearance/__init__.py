@@ -9,7 +9,7 @@ from .corrections import (
     afloat,
     keep_off_ground,
     lead_past,
-    raise_between_frames,
+    raising_between_frames,
     separating_arms,
 )
 
@@ -24,6 +24,6 @@ __all__ = [
     "keep_off_ground",
     "lead_past",
     "measure_overlap",
-    "raise_between_frames",
+    "raising_between_frames",
     "separating_arms",
 ]

@@ -515,13 +515,13 @@ def _bends(values: Floats) -> Floats:
     return np.sqrt(w * w + x * x + y * y + z * z)
 
 
-def raise_between_frames(
+def raising_between_frames(
     course: ArmsOverGround,
     poses: Poses,
     joints: Sequence[Floats],
     again: Callable[[np.ndarray, Floats], tuple[Poses, Sequence[Floats]]],
-) -> Poses:
-    """The same motion, without arms that dip into the ground between frames.
+) -> Generator[None, None, Poses]:
+    """The same motion, without arms that dip into the ground between frames; in steps.
 
     Poses of all frames are left as they are; joints of each arm are (frames, joints, 3). ``again``
     makes poses of some frames (n,), with arms (n, arms) so many arm lengths higher, and the joints
@@ -531,8 +531,10 @@ def raise_between_frames(
         return poses
     clear = course.clear(joints)
     lift = np.zeros(clear.shape)
+    yield
     tried = [(poses, course.dips(poses, clear))]
     for _ in range(_ROUNDS):
+        yield
         last, deep = tried[-1]
         # What dips no less for having been raised is not raised any further.
         before = tried[-2][1] if len(tried) > 1 else np.zeros_like(deep)
@@ -544,6 +546,7 @@ def raise_between_frames(
             break
         lift = np.minimum(lift + more, _MOST)
         fresh, places = again(chosen, lift[chosen])
+        yield
         arms = np.flatnonzero(np.any(lift[chosen] > 0.0, axis=0)).tolist()
         rotations, strains, deep = last.rotations.copy(), last.strains.copy(), deep.copy()
         for bones in (course.bones[arm] for arm in arms):

@@ -27,6 +27,7 @@ from .surface import (
     ground_along_path,
     passes_over_itself,
     sample_ground,
+    sampling_ground,
 )
 from .unrolled import Unrolled, roll_out
 from .walk import GroundedWalk, SwingSmoothing, frames_around
@@ -62,6 +63,7 @@ __all__ = [
     "raise_over_ground",
     "roll_out",
     "sample_ground",
+    "sampling_ground",
     "span",
     "timing_at_rest",
     "turn_between",

@@ -13,7 +13,7 @@ turning by 0.05 to 0.58 radians from frame to frame.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -396,7 +396,7 @@ def cycles_at(phases: Floats, middle: float) -> tuple[np.ndarray, Floats]:
     return number.astype(np.int64), turns - number
 
 
-def lay(
+def laying(
     limbs: Limbs,
     line: Line,
     ground: Ground,
@@ -409,8 +409,8 @@ def lay(
     seed: int = 0,
     cyclic: bool = False,
     uneven: UnevenHolds | None = None,
-) -> Footholds:
-    """Lay all footholds of some arms.
+) -> Generator[None, None, Footholds]:
+    """Lay all footholds of some arms, in steps.
 
     Args:
         limbs: the arms.
@@ -433,11 +433,13 @@ def lay(
     roots = _RootPath(limbs, line, timing, numbers, middle / CYCLE)
     curl = _curls(limbs, 0 * numbers if cyclic else numbers, seed) + bent
     joint = limbs.touching(settings.planted)
-    spot, lie, half, firm = _places(roots, shift, ground, settings, beside)
+    spot, lie, half, firm = yield from _finding_places(roots, shift, ground, settings, beside)
+    yield
     spot, heading = overridden.put(spot, np.arctan2(lie[..., 1], lie[..., 0]))
     # As if they were round.
     skins = np.broadcast_to(limbs.radii[joint:].T[:, None], (*shape, len(limbs.radii) - joint))
     joints = laid(limbs, ground, joint, skins=skins, spot=spot, heading=heading, curl=curl)
+    yield
     touch_down, lift_off, middles = _times(shift, half)
     at_touch_down, at_lift_off = roots.at(np.stack([touch_down, lift_off]))[0]
     return Footholds(
@@ -501,14 +503,14 @@ class _RootPath:
         return np.moveaxis(self.timing.distances(self.limbs.arms, cycles), 0, -2)
 
 
-def _places(
+def _finding_places(
     path: _RootPath,
     shift: Floats,
     ground: Ground,
     settings: StanceSettings,
     beside: Sequence[Floats],
-) -> tuple[Floats, Floats, Floats, np.ndarray]:
-    """Where arms touch (arms, cycles, 3), which way they lie (arms, cycles, 2), half of how long
+) -> Generator[None, None, tuple[Floats, Floats, Floats, np.ndarray]]:
+    """In steps, where arms touch (arms, cycles, 3), which way they lie (arms, cycles, 2), half of how long
     they do (arms, cycles), in cycles, and whether at all (arms, cycles); stances (arms, cycles) are
     shifted by so many cycles, and places are beside the usual ones by radians and arm lengths
     (arms, cycles).
@@ -522,12 +524,14 @@ def _places(
     aside, farther = settled(ground, roots, aim, lie, away, sizes=sizes)
     aside, farther = aside + beside[0], farther + beside[1] * limbs.reach[-1][:, None]
     aim, lie = rotate_in_plane(aim, aside), rotate_in_plane(lie, aside)
+    yield
     # One after the other, for the first will do for nearly all.
     passings = (
         (times[2], Passing(roots, path.at(shift + np.stack(times))[0]))
         for times in stance_times(path.duty(settings, shift))
     )
     distance, half = spots(limbs, ground, settings, passings, aim=aim, away=away, farther=farther)
+    yield
     spot = roots.copy()
     spot[..., :2] += distance[..., None] * aim
     half = half * _unturned(path, shift, half)

@@ -8,7 +8,7 @@ table, for all frames, arms and joints at once. Heights between the samples are 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final, Protocol
@@ -20,6 +20,7 @@ from ...errors import GroundError
 from ...phrases import phrase
 from ...rotations import Floats
 from ...settings import check_settings, setting, share_setting
+from ...steps import finished
 
 _EDGE: Final = 1e-6
 """Share of a face by which it reaches beyond its edges, so that none falls between two."""
@@ -230,7 +231,7 @@ def _along(heights: Floats, first: np.ndarray, share: Floats) -> Floats:
     return rise
 
 
-def sample_ground(
+def sampling_ground(
     triangles: Floats,
     path: Floats,
     needed: np.ndarray,
@@ -241,8 +242,8 @@ def sample_ground(
     gap: float = 0.0,
     content: bytes | None = None,
     bare: float | None = None,
-) -> HeightField:
-    """The ground that faces make along a path.
+) -> Generator[None, None, HeightField]:
+    """The ground that faces make along a path, in steps.
 
     Of several surfaces one above the other, the highest counts that is not further than the
     headroom above the path: what a creature walks on, not the roof above it. Where the samples lie
@@ -273,7 +274,11 @@ def sample_ground(
     grid = HeightField((float(low[0]), float(low[1])), spacing, np.zeros((shape[0], shape[1])))
     content = content or content_key(triangles)
     key = content_key(content, grid.origin, spacing, shape)
-    lowest, highest = _extents.get(key, lambda: _extent(triangles, grid))
+    if (known := _extents.known(key)) is None:
+        found = yield from _finding_extent(triangles, grid)
+        known = _extents.get(key, lambda: found)
+    lowest, highest = known
+    yield
     single = _single_known.get(key, lambda: _single(grid, lowest, highest))
     if single is not None:
         # There is nothing to choose between.
@@ -289,6 +294,25 @@ def sample_ground(
         return single or HeightField(grid.origin, spacing, _filled(heights))
     filled = single.heights if single is not None else _filled(heights)
     return HeightField(grid.origin, grid.spacing, filled, gaps)
+
+
+def sample_ground(
+    triangles: Floats,
+    path: Floats,
+    needed: np.ndarray,
+    *,
+    reach: float,
+    spacing: float,
+    headroom: float,
+    gap: float = 0.0,
+    content: bytes | None = None,
+    bare: float | None = None,
+) -> HeightField:
+    """The same at once."""
+    sizes = {"reach": reach, "spacing": spacing, "headroom": headroom, "gap": gap}
+    return finished(
+        sampling_ground(triangles, path, needed, **sizes, content=content, bare=bare)
+    )
 
 
 def _close(path: Floats, spacing: float) -> Floats:
@@ -416,12 +440,17 @@ def _nearest(grid: HeightField, points: Floats) -> tuple[np.ndarray, np.ndarray]
     return place[:, 0], place[:, 1]
 
 
-def _extent(triangles: Floats, grid: HeightField) -> tuple[Floats, Floats]:
-    """Lowest and highest of all faces at each sample (nx, ny); +∞ and −∞ where there is none."""
+def _finding_extent(
+    triangles: Floats, grid: HeightField
+) -> Generator[None, None, tuple[Floats, Floats]]:
+    """Lowest and highest of all faces at each sample (nx, ny); +∞ and −∞ where there is none. In
+    steps.
+    """
     lowest, highest = np.full(grid.heights.size, np.inf), np.full(grid.heights.size, -np.inf)
     for place, z, _ in _hits(triangles, grid):
         np.minimum.at(lowest, place, z)
         np.maximum.at(highest, place, z)
+        yield
     return lowest.reshape(grid.heights.shape), highest.reshape(grid.heights.shape)
 
 
@@ -437,7 +466,7 @@ def faces_of(triangles: Floats, ground: HeightField) -> np.ndarray:
 
 
 def _single(grid: HeightField, lowest: Floats, highest: Floats) -> HeightField | None:
-    """The ground, if no two faces are above each other; arguments as :func:`_extent` returns."""
+    """The ground, if no two faces are above each other; arguments as :func:`_finding_extent` returns."""
     there = np.isfinite(highest)
     # Where two faces meet, both are there.
     if np.max(highest[there] - lowest[there], initial=0.0) > _ONE * grid.spacing:

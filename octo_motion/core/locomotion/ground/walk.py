@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -17,7 +18,7 @@ from ..path import Line, values_along
 from ..rig import ArmSkin, BodyFrame, Facing, rotate_bones, sucker_sides
 from .arm_curves import Seen, skin_below
 from .contact_timing import ContactTiming, EvenTiming
-from .footholds import ContactOverride, Footholds, cycles_at, lay, relaid
+from .footholds import ContactOverride, Footholds, cycles_at, laying, relaid
 from .stance_swing import (
     Batch,
     Stance,
@@ -366,6 +367,14 @@ _LOOKS: Final = 16
 """Moments of a cycle at which it is looked at which side of its skin an arm lies on."""
 
 
+def _are_round(parts: Sequence[WalkPart], skins: Sequence[ArmSkin]) -> bool:
+    return not skins or all(
+        skins[arm].is_round(part.sides[arm], part.footholds.touching)
+        for part in parts
+        for arm in part.build.arms
+    )
+
+
 class GroundedWalk:
     """A body that walks over a ground.
 
@@ -420,29 +429,61 @@ class GroundedWalk:
         # Where nothing varies at random, the seed does not matter.
         seed = poser.settings.seed if any(poser.settings.variation) else 0
         self._ends = np.cumsum([0] + [len(arm.bones) for arm in poser.arms])
-        self._parts: list[WalkPart] = []
+        self._found: list[WalkPart] = []
+        self._laying = self._laying_footholds(
+            sides, radii, may_stretch, contact_overrides, skins, phases
+        )
+
+    def laying(self) -> Generator[None, None, None]:
+        """Lay all footholds, in steps; else that is done when they are first asked for."""
+        yield from self._laying
+
+    @property
+    def _parts(self) -> list[WalkPart]:
+        if not self._found:
+            deque(self._laying, maxlen=0)
+        return self._found
+
+    def _laying_footholds(
+        self,
+        sides: Sequence[Floats],
+        radii: Sequence[Floats],
+        may_stretch: Sequence[bool],
+        contact_overrides: Sequence[ContactOverride],
+        skins: Sequence[ArmSkin],
+        phases: tuple[float, float],
+    ) -> Generator[None, None, None]:
+        poser, ground, settings = self._poser, self._ground, self._settings
+        # Where nothing varies at random, the seed does not matter.
+        seed = poser.settings.seed if any(poser.settings.variation) else 0
+        parts: list[WalkPart] = []
         for build in poser.builds:
             for stretch in sorted({may_stretch[arm] for arm in build.arms}):
                 arms = tuple(arm for arm in build.arms if may_stretch[arm] == stretch)
                 own = Build(arms, build.chain, build.widths)
                 limbs = limbs_of(
-                    poser, own, radii, scale=scale, planted=settings.planted, may_stretch=stretch
+                    *(poser, own, radii),
+                    scale=self._scale,
+                    planted=settings.planted,
+                    may_stretch=stretch,
                 )
-                footholds = lay(
-                    *(limbs, line, ground, settings, self._timing),
+                yield
+                footholds = yield from laying(
+                    *(limbs, self._line, ground, settings, self._timing),
                     middle=self._middle,
                     cycles=self._cycles,
                     contact_overrides=contact_overrides,
                     seed=seed,
-                    cyclic=cyclic,
+                    cyclic=self._cyclic,
                     uneven=self._uneven,
                 )
-                self._parts.append(WalkPart(poser, ground, settings, sides, own, limbs, footholds))
-        if not self._are_round(skins):
+                parts.append(WalkPart(poser, ground, settings, sides, own, limbs, footholds))
+        self._found = parts
+        if not _are_round(parts, skins):
             below = self._below(skins, phases)
-            self._parts = [
+            self._found = [
                 replace(part, footholds=relaid(part.footholds, part.limbs, ground, own))
-                for part, own in zip(self._parts, below, strict=True)
+                for part, own in zip(parts, below, strict=True)
             ]
 
     @property
@@ -453,13 +494,6 @@ class GroundedWalk:
             return None
         periods = self._timing.cycle_period or settings.period
         return UnevenHolds(settings.uneven, settings.seed, periods)
-
-    def _are_round(self, skins: Sequence[ArmSkin]) -> bool:
-        return not skins or all(
-            skins[arm].is_round(part.sides[arm], part.footholds.touching)
-            for part in self._parts
-            for arm in part.build.arms
-        )
 
     def _below(self, skins: Sequence[ArmSkin], phases: tuple[float, float]) -> list[Floats]:
         """For each build (arms, cycles, segments + 1 − c) metres from joints to the skin below.

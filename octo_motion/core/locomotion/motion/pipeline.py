@@ -16,13 +16,14 @@ import numpy as np
 from ...keyframes import Channel
 from ...phrases import phrase
 from ...rotations import IDENTITY, Floats, conjugate, from_matrix, multiply, rotate, slerp
+from ...steps import evenly
 from ..body import BodyMoments, OrganPoses, pose_organs
 from ..clearance import (
     ArmsOverGround,
     Opened,
     keep_off_ground,
     lead_past,
-    raise_between_frames,
+    raising_between_frames,
     separating_arms,
 )
 from ..gait import CYCLE
@@ -316,7 +317,7 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     made = yield from segments.compute(travel, body.places, step, frames_per_metre, cyclic=cyclic)
     # Each of these takes a while; who works in turns looks about in between.
     yield 0.9
-    arms = _cleared(plan, made, going, cyclic=cyclic)
+    arms = yield from evenly(_clearing(plan, made, going, cyclic=cyclic), 0.9)
     yield 0.93
     swimming = segments.swimming(travel.distance)
     # What is reached for is in the world.
@@ -528,10 +529,10 @@ def _underfoot(plan: MotionPlan) -> Ground | None:
     return plan.standing[0].underfoot if plan.standing else None
 
 
-def _cleared(
+def _clearing(
     plan: MotionPlan, made: SegmentedMotion, going: Travelled, *, cyclic: bool
-) -> ArmMotion:
-    """Arms that do not dip into the ground between frames, nor swim into it."""
+) -> Generator[None, None, ArmMotion]:
+    """In steps, arms that do not dip into the ground between frames, nor swim into it."""
     arms, ground, creature = made.arms, _underfoot(plan), plan.job.creature
     if ground is None:
         return arms
@@ -555,8 +556,9 @@ def _cleared(
         return poses, joints if joints is not None else course.joints(poses)
 
     whole = kept_off(Poses(arms.rotations, arms.strains, *going), loose)
+    yield
     joints = made.joints
-    raised = raise_between_frames(
+    raised = yield from raising_between_frames(
         course, whole, joints if joints is not None else course.joints(whole), again
     )
     arms.rotations, arms.strains = raised.rotations, raised.strains

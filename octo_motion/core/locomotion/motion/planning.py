@@ -16,6 +16,7 @@ from ...errors import SettingsError
 from ...phrases import phrase
 from ...rotations import Floats, multiply, normalized, rotate
 from ...skeleton import Skeleton
+from ...steps import evenly
 from ..body import BodyTrack, Holds, SelfMotion, Stalking, Surge, self_motion, steps_of, surge
 from ..gait import (
     CYCLE,
@@ -342,6 +343,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     job, carry, faces = _planned(job)
     yield 0.0
     when = schedule(job)
+    yield 0.0
     route, lean = when.route, when.lean
     plane = _lowest(route) if isinstance(job.changes, ChangesByHeight) else None
     changes = bool(job.changes) and not job.in_place
@@ -363,9 +365,12 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         # Contacts are places in the world; in place the ground goes by.
         asked = () if job.in_place else overrides
         walk = standing.walk(standing.line, asked) if standing is not None else None
+        if walk is not None:
+            yield from evenly(walk.laying(), 0.6)
         segments = Segments(gaits, [walk], None, [len(each) for each in job.creature.bones], route)
     yield 0.8
     pace = pace_of(route, when.travel, when.seconds * job.timing.rate)
+    yield 0.8
     warnings = [*job.warnings, *(standing.warnings if standing is not None else ())]
     if standing is not None or changes:
         warnings += too_few_frames(job.timing, pace)

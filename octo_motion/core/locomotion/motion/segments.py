@@ -19,6 +19,7 @@ from ...content_cache import ContentCache, content_key
 from ...phrases import phrase
 from ...rotations import Floats, rotate
 from ...smoothing import least_jerk
+from ...steps import evenly
 from ..clearance import afloat
 from ..gait import CYCLE, GaitPoser, GaitTable
 from ..ground import (
@@ -43,7 +44,7 @@ from ..ground import (
     ground_along_path,
     leaning,
     passes_over_itself,
-    sample_ground,
+    sampling_ground,
     span,
     timing_at_rest,
 )
@@ -245,6 +246,7 @@ def standing_on(
         GroundError: the route leaves the ground.
     """
     bearings, scale = bearings_of(route, travel, coarse=near is not None), creature.scale
+    yield 0.0
     reach, phases = poser.arm_length * scale, (0.0, CYCLE * strides(route, travel))
     (ground, underfoot), warnings = yield from _finding_ground(
         job, route, travel, bearings, reach=reach, plane=plane, cyclic=cyclic, near=near
@@ -258,6 +260,7 @@ def standing_on(
         under=_under(poser, job) * scale,
         around=near and near.around(travel.stride, route.length),
     )
+    yield 0.8
     if near and not cyclic:
         phases, job = near.phases(travel.stride), near.as_rested(job, travel.stride, route.length)
     return Standing(
@@ -364,7 +367,7 @@ def _finding_ground(
     start, end = (0.0, route.length) if near is None else near.around(travel.stride, route.length)
     count = int(np.ceil((end - start + 2.0 * beyond) / (_PATH_STEP * reach))) + 1
     distance = np.linspace(start - beyond, end + beyond, count)
-    path, _ = walked_at(route, travel, bearings, distance)
+    path, _ = walked_at(route, travel, bearings, distance, coarse=near is not None)
     if job.mesh is None:
         warnings = job.warnings
         if passes_over_itself(path, 0.5 * reach, 0.5 * reach):
@@ -380,7 +383,8 @@ def _finding_ground(
     if (found := _grounds.known(key)) is None:
         triangles = mesh.triangles
         yield 0.1
-        sampled = sample_ground(triangles, path, inside, **sizes, content=mesh.content)
+        sampling = sampling_ground(triangles, path, inside, **sizes, content=mesh.content)
+        sampled = yield from evenly(sampling, 0.3)
         yield 0.4
         made = sampled, sampled.rounded(_EDGE * reach)
         found = _grounds.get(key, lambda: made)

@@ -21,7 +21,7 @@ from ...rotations import Floats, conjugate, multiply, slerp
 from ...steps import finished
 from ..body import OrganPoses
 from ..gait import RoughGaitPoser
-from ..path import distances_at
+from ..path import Route, distances_at
 from ..rig import ArmMotion
 from .job import MotionJob
 from .pipeline import (
@@ -88,6 +88,8 @@ class Sketch:
         along = np.linspace(0.0, 1.0, len(centres)), come / when.route.length
         self._shares: Floats = np.clip(np.concatenate(along), 0.0, 1.0)
         """Of the route's length at which these are."""
+        self._on_route = self._route_at(when.route)
+        """The route there."""
 
     def may_show(self, job: MotionJob) -> bool:
         """Whether a motion can be drawn so: on one gait all the way, in the world as it
@@ -107,8 +109,12 @@ class Sketch:
 
     def preparing(self, frame: float) -> Generator[float, None, None]:
         """Work out beforehand, in steps, what will be asked for near a frame."""
+        plan = self._known.plan
+        moment = plan.moment_of(frame)
         for anew in (False, True):
-            yield from self._making(self._known.plan.moment_of(frame), anew=anew)
+            yield from self._making(moment, anew=anew)
+        frames, times = (each[moment : moment + 1] for each in plan.moments)
+        self._organs = frame, organs_at(plan, frames, body_at(plan, times).keyed, None)
 
     def at(self, job: MotionJob, frame: float) -> list[Glimpsed]:
         """What a motion is nearly at a frame: the values of all channels.
@@ -140,16 +146,15 @@ class Sketch:
         places = np.concatenate([centres, held])
         if route is before:
             return centres, held
-        there, here = (
-            each.position(each.parameter_near(self._shares * each.length))
-            for each in (route, before)
-        )
-        moved = there - here
+        moved = self._route_at(route) - self._on_route
         if plan.standing:
             ground, beside = plan.standing[0].ground, (places + moved)[:, :2]
             moved[:, 2] = ground.height(beside) - ground.height(places[:, :2])
         places = places + moved
         return places[: len(centres)], places[len(centres) :]
+
+    def _route_at(self, route: Route) -> Floats:
+        return route.position(route.parameter_near(self._shares * route.length))
 
     def _made_around(self, number: int, *, anew: bool) -> _Made:
         """What is made of arms around one of the moments."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import acos, atan2, cos, exp, sin, sqrt
 from typing import Final, Literal
 
@@ -64,16 +65,58 @@ class Bearings:
     length: float
     """Metres of route that the table spans."""
     cyclic: bool
-    carried: Floats
-    """(n, 4) world orientations with local +Z along travel, carried with the least roll."""
-    roll: Floats
-    """(n,) radians about travel from the carried frame to the one whose −Y faces up."""
-    compass: Floats
-    """(n,) radians about world Z, unwrapped, from −Y to the horizontal direction of travel."""
-    bend: Floats
-    """(n, 2) how far travel has turned towards +X and +Y of the carried frame, radians."""
-    lap: float
-    """Radians about travel by which the carried frame of a closed route has turned after a lap."""
+    travel: Floats
+    """(n, 3) unit: the way of travel, its corners rounded off."""
+    pace: float
+    """Share of the way that an angle that has lost its hold comes back with each step."""
+
+    # What a body asks that walks upright is worked out at once with the rest of it left aside.
+
+    @cached_property
+    def carried(self) -> Floats:
+        """(n, 4) world orientations with local +Z along travel, carried with the least roll."""
+        return continuous(self._carried)
+
+    @cached_property
+    def roll(self) -> Floats:
+        """(n,) radians about travel from the carried frame to the one whose −Y faces up."""
+        up = rotate(conjugate(self._carried), _UP)
+        wanted = np.arctan2(up[:, 0], -up[:, 1])
+        return _held_angle(wanted, self._level, self.pace, -self.lap, self.cyclic)
+
+    @cached_property
+    def compass(self) -> Floats:
+        """(n,) radians about world Z, unwrapped, from −Y to the horizontal direction of travel."""
+        wanted = np.arctan2(self.travel[:, 0], -self.travel[:, 1])
+        return _held_angle(wanted, self._level, self.pace, 0.0, self.cyclic)
+
+    @cached_property
+    def bend(self) -> Floats:
+        """(n, 2) how far travel has turned towards +X and +Y of the carried frame, radians."""
+        local = rotate(conjugate(self._carried[:-1]), self.travel[1:])
+        across = local[:, :2]
+        sine = np.hypot(across[:, 0], across[:, 1])
+        angle = np.arctan2(sine, local[:, 2])
+        factor = np.divide(angle, sine, out=np.ones_like(sine), where=sine > 0.0)
+        return np.concatenate([np.zeros((1, 2)), np.cumsum(factor[:, None] * across, axis=0)])
+
+    @cached_property
+    def lap(self) -> float:
+        """Radians about travel by which the carried frame of a closed route has turned after a lap.
+        """
+        if not self.cyclic:
+            return 0.0
+        lap = multiply(conjugate(self._carried[0]), self._carried[-1])
+        return 2.0 * atan2(lap[3], lap[0])
+
+    @cached_property
+    def _carried(self) -> Floats:
+        return _carry(self.travel)
+
+    @cached_property
+    def _level(self) -> Floats:
+        """(n,) sine of the angle between travel and the vertical."""
+        return np.hypot(self.travel[:, 0], self.travel[:, 1])
 
     def carried_at(self, distance: Floats) -> Floats:
         """Orientations ``(frames, 4)``, signs continuous along the route."""
@@ -136,26 +179,7 @@ def bearings(route: Route, corner: float, settle: float, *, coarse: bool = False
     samples = route.parameter_near(distances) if coarse else route.parameter_at(distances)
     raw = route.tangent(_past_joints(samples, route.breaks))
     travel = _rounded(raw, exp(-spacing / corner), int(_TAIL * corner / spacing), route.cyclic)
-
-    carried = _carry(travel)
-    local = rotate(conjugate(carried[:-1]), travel[1:])
-    across = local[:, :2]
-    sine = np.hypot(across[:, 0], across[:, 1])
-    angle = np.arctan2(sine, local[:, 2])
-    factor = np.divide(angle, sine, out=np.ones_like(sine), where=sine > 0.0)
-    bend = np.concatenate([np.zeros((1, 2)), np.cumsum(factor[:, None] * across, axis=0)])
-
-    lap = multiply(conjugate(carried[0]), carried[-1])
-    around = 2.0 * atan2(lap[3], lap[0]) if route.cyclic else 0.0
-    level = np.hypot(travel[:, 0], travel[:, 1])
-    up = rotate(conjugate(carried), _UP)
-    roll = _held_angle(
-        np.arctan2(up[:, 0], -up[:, 1]), level, spacing / settle, -around, route.cyclic
-    )
-    compass = _held_angle(
-        np.arctan2(travel[:, 0], -travel[:, 1]), level, spacing / settle, 0.0, route.cyclic
-    )
-    return Bearings(route.length, route.cyclic, continuous(carried), roll, compass, bend, around)
+    return Bearings(route.length, route.cyclic, travel, spacing / settle)
 
 
 def _past_joints(samples: Floats, breaks: Floats) -> Floats:
@@ -575,16 +599,22 @@ def travel_at(
 
 
 def walked_at(
-    route: Route, settings: TravelSettings, table: Bearings, distance: ArrayLike
+    route: Route,
+    settings: TravelSettings,
+    table: Bearings,
+    distance: ArrayLike,
+    *,
+    coarse: bool = False,
 ) -> tuple[Floats, Floats]:
     """Where a walking, upright body is, (n, 3) and (n, 4) world, at distances (n,) along its route,
-    and before and after it.
+    and before and after it; coarse, as near to these as ``Route.parameter_near`` finds at once.
 
     Beyond the ends of an open route it goes straight on; a closed one it goes round again.
     """
     wanted = np.asarray(distance, dtype=np.float64)
     inside = np.mod(wanted, route.length) if route.cyclic else np.clip(wanted, 0.0, route.length)
-    positions = route.position(route.parameter_at(inside))
+    found = route.parameter_near(inside) if coarse else route.parameter_at(inside)
+    positions = route.position(found)
     if not route.cyclic:
         ends = route.tangent(np.array([0.0, 1.0]))
         beyond = wanted - inside

@@ -35,7 +35,7 @@ from ....core.steps import finished
 from ...overlay_lines import Lines
 from ..reading import previous_action
 from ..settings import locomotion_settings
-from .shot import Before, Shot, prepare, prepare_anew
+from .shot import Before, Shot, note_of, prepare, prepare_anew
 
 _PATH: Final = (1.0, 0.75, 0.2, 0.9)
 _FOOTHOLD: Final = (0.3, 0.9, 0.85, 0.9)
@@ -171,6 +171,10 @@ class Following:
 
         What was shown nearly as it will be comes first, and is told by :meth:`tell`.
         """
+        armature = bpy.data.objects.get((self.shot.armature, None))
+        if armature is not None:
+            self.shot.note = note_of(locomotion_settings(armature))
+        yield 0.0
         if self._plan is None:
             plan = yield from plan_motion(self.shot.job)
             self._plan = plan

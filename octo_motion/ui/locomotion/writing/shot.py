@@ -189,7 +189,7 @@ class Shot:
     """What the artist wants of single contacts."""
     extend_scene_range: bool
     note: str
-    """The settings as JSON, kept with the action."""
+    """The settings as JSON, kept with the action; "" for live until there is time for it."""
     result: MotionResult | None = None
     """What :meth:`compute` has come to."""
     summary: Summary | None = None
@@ -600,8 +600,13 @@ def prepare(
         rig=found,
         edits=edits,
         extend_scene_range=settings.extend_scene_range,
-        note=json.dumps(plain(settings, without=RESULTS), sort_keys=True),
+        note="" if live else note_of(settings),
     )
+
+
+def note_of(settings: OCTO_MOTION_PG_locomotion) -> str:
+    """All settings as text, to be kept with what is made of them."""
+    return json.dumps(plain(settings, without=RESULTS), sort_keys=True)
 
 
 def prepare_anew(

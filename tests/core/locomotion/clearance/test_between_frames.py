@@ -4,11 +4,12 @@
 import numpy as np
 import pytest
 
-from octo_motion.core.locomotion.clearance.corrections import ArmsOverGround, raise_between_frames
+from octo_motion.core.locomotion.clearance.corrections import ArmsOverGround, raising_between_frames
 from octo_motion.core.locomotion.ground.walk import Raise
 from octo_motion.core.locomotion.rig.bone_rotations import frames_of_arm
 from octo_motion.core.locomotion.rig.poses import Poses, object_transforms
 from octo_motion.core.rotations import Floats, from_axis_angle, multiply, rotate
+from octo_motion.core.steps import finished
 from tests.core.grounds import GROUNDS, Walker, largest_turn, walker
 
 
@@ -53,7 +54,7 @@ def test_on_bumps_at_a_fast_pace_arms_are_raised_at_the_frames_round_a_dip() -> 
     low = np.zeros_like(shot.course.clear(joints))
     before = shot.course.dips(poses, low)
     assert before.max() > 0.008
-    after = raise_between_frames(shot.course, poses, joints, shot.again)
+    after = finished(raising_between_frames(shot.course, poses, joints, shot.again))
     # Half a hundredth of the arm, as on frames.
     assert shot.course.dips(after, low).max() < 0.005
     # Far from any dip nothing changes.
@@ -73,7 +74,7 @@ def test_an_arm_that_would_jerk_when_raised_is_left_as_it_was() -> None:
         turned = multiply(raised.rotations, aside[:, None])
         return Poses(turned, raised.strains, raised.locations, raised.orientations), places
 
-    after = raise_between_frames(shot.course, poses, joints, jerky)
+    after = finished(raising_between_frames(shot.course, poses, joints, jerky))
     assert len(shot.asked) > 0
     assert largest_turn(after.rotations) <= largest_turn(poses.rotations) + np.radians(5.0)
 
@@ -91,7 +92,7 @@ def test_what_is_not_looked_at_cannot_dip() -> None:
 def test_at_an_easy_pace_on_level_ground_nothing_is_made_anew(ground: str) -> None:
     shot = Shot(walker(GROUNDS[ground], stretch=True), 48)
     poses, joints = shot.whole()
-    assert raise_between_frames(shot.course, poses, joints, shot.again) is poses
+    assert finished(raising_between_frames(shot.course, poses, joints, shot.again)) is poses
     assert shot.asked == []
 
 
@@ -110,7 +111,7 @@ def test_what_cannot_be_helped_gets_no_worse(frames: int, *, stretch: bool) -> N
     shot = Shot(walker(GROUNDS["bumps"], stretch=stretch, rest=1.0), frames)
     poses, joints = shot.whole()
     low = np.zeros_like(shot.course.clear(joints))
-    after = raise_between_frames(shot.course, poses, joints, shot.again)
+    after = finished(raising_between_frames(shot.course, poses, joints, shot.again))
     assert shot.course.dips(after, low).max() <= shot.course.dips(poses, low).max()
 
 
