@@ -11,7 +11,7 @@ from one place, no pose can keep these apart.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any, Final, TypeVar
@@ -22,6 +22,7 @@ from ...content_cache import part_of
 from ...rotations import Floats
 from ...rotations.components_first import dot
 from ...smoothing import smooth_step
+from ...steps import finished
 
 _Made = TypeVar("_Made")
 
@@ -85,7 +86,14 @@ class Separation:
 
 
 def measure_overlap(chains: Sequence[Capsules], still: Sequence[Capsules] = ()) -> Separation:
-    """How far chains, the arms, pass through each other and through parts of the body.
+    """How far chains pass through each other, as :func:`measuring_overlap` finds."""
+    return finished(measuring_overlap(chains, still))
+
+
+def measuring_overlap(
+    chains: Sequence[Capsules], still: Sequence[Capsules] = ()
+) -> Generator[None, None, Separation]:
+    """How far chains, the arms, pass through each other and through parts of the body; in steps.
 
     Neighbouring capsules of one chain are joined; a chain is not measured against itself, nor parts
     against each other.
@@ -102,7 +110,10 @@ def measure_overlap(chains: Sequence[Capsules], still: Sequence[Capsules] = ()) 
         return found.frame[deep], found.one[deep], found.other[deep], depths[deep]
 
     depths = np.zeros(parts.starts.shape[1])
-    found = near(Middles.of(parts), pairs, overlapping)
+    found: list[tuple[np.ndarray, ...]] = []
+    for each in near(Middles.of(parts), pairs, overlapping):
+        found.append(each)
+        yield
     number, one, other, deep = joined(found, (np.intp, np.intp, np.intp, np.float64))
     np.maximum.at(depths, number, deep)
     owner = parts.owner
@@ -220,7 +231,7 @@ def near(
     margin: float = 0.0,
     slack: float = 0.0,
     anew: np.ndarray | None = None,
-) -> list[_Made]:
+) -> Iterator[_Made]:
     """What is made of capsules whose bounding spheres touch, a piece of them at a time.
 
     Args:
@@ -232,7 +243,7 @@ def near(
         anew: (frames, chains) whose capsules are asked for, each with all others; else all are.
     """
     if not len(pairs[0]):
-        return []
+        return
     owner = middles.owner
     rounding = 1e-6 * float(middles.squares.max(initial=0.0))
     size = middles.reach + (1.0 + margin) * middles.wide + 0.5 * slack
@@ -240,7 +251,8 @@ def near(
     limit[pairs] = ((size[pairs[0]] + size[pairs[1]]) * (1.0 + _ROUNDED)) ** 2 + rounding
     asked = np.ones((len(middles.places), owner.max() + 1), dtype=bool) if anew is None else anew
     search = _Search(middles, np.maximum(limit, limit.T), rounding, asked)
-    return [make(search.near_to(*task)) for task in search.tasks()]
+    for task in search.tasks():
+        yield make(search.near_to(*task))
 
 
 @dataclass(frozen=True, eq=False)
@@ -525,16 +537,19 @@ class Touching:
         ]
         return parts_of([*self._chains(joints), *body])
 
-    def now(self) -> Touches:
-        """What overlaps while nobody has made way yet."""
+    def seeing(self) -> Generator[None, None, Touches]:
+        """What overlaps while nobody has made way yet; in steps."""
         points = self._points(self._crowd.joints)
 
         def overlapping(found: Near) -> Touches:
             touches = self._at(points, np.stack([found.frame, found.one, found.other]))
             return part_of(touches, touches.depth > 0.0)
 
-        none = self._at(points, np.zeros((3, 0), dtype=np.intp))
-        return all_of([none, *near(self._middles, self._pairs, overlapping)])
+        found = [self._at(points, np.zeros((3, 0), dtype=np.intp))]
+        for each in near(self._middles, self._pairs, overlapping):
+            found.append(each)
+            yield
+        return all_of(found)
 
     def look_at(self, frames: np.ndarray, without: np.ndarray) -> None:
         """Look from now on only at what is near enough for arms that make way, in frames (frames,)

@@ -24,6 +24,7 @@ from ...rotations import (
     shortest_arc,
 )
 from ...smoothing import covered, smooth_step, spans
+from ...steps import evenly, finished
 from ..ground import Ground, raise_over_ground
 from ..rig import (
     TOLERATED,
@@ -36,7 +37,7 @@ from ..rig import (
     loose_from_root,
     room_needed,
 )
-from .capsule_overlap import Capsules, Crowd, Opened, Separation, measure_overlap
+from .capsule_overlap import Capsules, Crowd, Opened, Separation, measuring_overlap
 from .overlap_solver import parting
 from .way_past import Passing, led_past
 
@@ -114,9 +115,10 @@ def separating_arms(
         opened: where arms stand round a body that swims as it lies, none for others.
         cyclic: whether the last frame is the first again.
     """
-    crowd = _Crowded.of(
+    making = _Crowded.making(
         volume, rotations, strains, in_contact=in_contact, busy=busy, travel=travel, opened=opened
     )
+    crowd = yield from evenly(making, 0.0)
     yield 0.0
     moved = yield from parting(
         crowd.crowd,
@@ -156,7 +158,11 @@ def lead_past(
     """
     lying = [each > 0.0 for each in held]
     nobody = np.zeros(share.shape, dtype=bool)
-    crowd = _Crowded.of(volume, rotations, strains, in_contact=lying, busy=nobody, travel=travel)
+    crowd = finished(
+        _Crowded.making(
+            volume, rotations, strains, in_contact=lying, busy=nobody, travel=travel
+        )
+    )
     holds = np.stack([each.max(axis=1) for each in held], axis=1)
     passing = Passing(share, holds, crowd.crowd.in_contact.argmax(axis=2))
     moved = led_past(
@@ -182,7 +188,7 @@ class _Crowded:
     some: list[np.ndarray]
 
     @classmethod
-    def of(
+    def making(
         cls,
         volume: BodyVolume,
         rotations: Floats,
@@ -192,13 +198,16 @@ class _Crowded:
         busy: np.ndarray,
         travel: tuple[Floats, Floats],
         opened: Opened | None = None,
-    ) -> _Crowded:
-        """What arms with these rotations and strains, as in :func:`separating_arms`, are."""
+    ) -> Generator[None, None, _Crowded]:
+        """In steps, what arms with these rotations and strains, as in :func:`separating_arms`, are.
+        """
         some, chosen = _joints_chosen(volume.arms)
         posed = _Posed.of_all(volume.arms, rotations)
+        yield
         joints = np.empty((len(rotations), len(volume.arms), len(chosen[0]), 3))
         for each in posed:
             joints[:, each.numbers] = each.joints(strains)[:, :, chosen[each.numbers[0]]]
+            yield
         crowd = Crowd(
             joints=joints,
             radii=np.stack([own[which] for own, which in zip(volume.radii, chosen, strict=True)]),
@@ -350,7 +359,13 @@ class BodyVolume:
         )
 
     def measure(self, rotations: Floats, strains: Floats) -> tuple[Separation, int]:
-        """What overlaps, and at every how many frames it was looked for.
+        """What overlaps, as :meth:`measuring` finds."""
+        return finished(self.measuring(rotations, strains))
+
+    def measuring(
+        self, rotations: Floats, strains: Floats
+    ) -> Generator[None, None, tuple[Separation, int]]:
+        """What overlaps, and at every how many frames it was looked for; in steps.
 
         Rotations (frames, bones, 4) and strains (frames, bones) are of all arms, one after the
         other.
@@ -366,11 +381,12 @@ class BodyVolume:
             joints, rest = arm.joints(arm.from_bones(own), longer), arm.joints(arm.at_rest)
             radii = self.radii[number][some]
             chains.append(Capsules(self.names[number], joints[:, some], radii, rest[some]))
+            yield
         still = [
             Capsules(each.name, np.tile(each.joints, (len(looked), 1, 1)), each.radii, each.at_rest)
             for each in self.still
         ]
-        return measure_overlap(chains, still), every
+        return (yield from measuring_overlap(chains, still)), every
 
     @staticmethod
     def told(found: Separation, every: int, frames: Floats) -> tuple[str, ...]:

@@ -26,6 +26,7 @@ from ...content_cache import part_of
 from ...rotations import Floats
 from ...rotations.components_first import dot
 from ...smoothing import blur_reach, blurred, covered, smooth_step, widened
+from ...steps import evenly
 from ..ground import drawn
 from ..rig import TOLERATED, lowest_allowed
 from .capsule_overlap import Capsules, Crowd, Touches, Touching, all_of, aside, portions
@@ -162,7 +163,8 @@ def parting(
     if not len(every):
         return None
     touching = Touching(crowd, still)
-    touches = touching.now()
+    yield 0.0
+    touches = yield from evenly(touching.seeing(), 0.0)
     yield 0.0
     chosen = touches.depth > _DONE
     pairs, counts = np.unique(touches.pair[chosen], return_counts=True)
@@ -174,7 +176,9 @@ def parting(
         return None
     # Who makes way may be in the way of others then, but not for ever.
     around = widened(deep, _AROUND * blur_reach(width), cyclic=cyclic) > 0.0
+    yield 0.0
     touching.look_at(around, own_form)
+    yield 0.0
     crowded = _Parting(
         *(crowd, touching, np.flatnonzero(around), floor),
         width=width,
@@ -247,7 +251,9 @@ class _Parting:
             sunk = self._room.min() < -1e-4 * self._length
             if np.max(asked.touches.depth, initial=0.0) <= _DONE and not sunk:
                 break
-            wanted = self._spread(self._wanted(asked))
+            wanted = self._wanted(asked)
+            yield number / rounds
+            wanted = self._spread(wanted)
             yield number / rounds
             self._move(wanted)
             yield number / rounds

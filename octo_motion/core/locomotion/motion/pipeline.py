@@ -201,7 +201,8 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     planned, along = posed.planned or (arms, posed.going)
     framed = along[0][::every], along[1][::every]
     stays = keyed[0][::every], keyed[1][::every]
-    measured, overlaps = _measured(plan, planned.at(slice(None, None, every)), framed, stays)
+    measuring = _measuring(plan, planned.at(slice(None, None, every)), framed, stays)
+    measured, overlaps = yield from evenly(measuring, moving)
     if measured is not None and plan.carry is not None:
         measured = _rolled_up(plan, measured, posed)
     # A key at every moment, unless fewer say the same.
@@ -211,8 +212,8 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
         channels = yield from scaled(_reduced(plan, motion, moments, every), moving, 1.0)
         if measured is not None and plan.carry is None:
             travels = not plan.job.in_place
-            measuring = measuring_keyed(measured, plan.job.creature, channels, travels=travels)
-            measured = yield from measuring
+            keyed_so = measuring_keyed(measured, plan.job.creature, channels, travels=travels)
+            measured = yield from keyed_so
             yield 1.0
     found = (yield from finding_figures(measured)) if measured is not None else ()
     yield 1.0
@@ -306,6 +307,7 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     """
     job, segments = plan.job, plan.segments
     body = body_at(plan, times)
+    yield 0.0
     creature, hands, travel, going, keyed = (
         job.creature,
         body.hands,
@@ -724,21 +726,24 @@ def _opened(plan: MotionPlan, count: int, swimming: Floats | None) -> Opened | N
     return Opened(lying.opens_to, np.ones(count) if swimming is None else swimming)
 
 
-def _measured(
+def _measuring(
     plan: MotionPlan, arms: ArmMotion, going: Travelled, keyed: Travelled
-) -> tuple[Measured | None, tuple[str, ...]]:
-    """What figures are taken from, where they are wanted, and what overlaps in words."""
+) -> Generator[None, None, tuple[Measured | None, tuple[str, ...]]]:
+    """In steps, what figures are taken from, where they are wanted, and what overlaps in words."""
     job, creature, separation, every = plan.job, plan.job.creature, None, 1
     overlaps: tuple[str, ...] = ()
     if job.volume is not None and job.tell_overlaps:
-        separation, every = job.volume.measure(arms.rotations, arms.strains)
+        separation, every = yield from job.volume.measuring(arms.rotations, arms.strains)
+        yield
         overlaps = job.volume.told(separation, every, plan.schedule.frames)
     if job.live:
         return None, overlaps
+    yield
     poses = Poses(arms.rotations, arms.strains, *going)
     below = plan.standing[0].job if plan.standing else job.floor
     ground = _ground(plan)
     floor = _floor_under(job, keyed, plan.first.poser.arm_length * creature.scale)
+    yield
     # Between frames it matters what is below.
     nowhere = ground is None and floor is None
     measured = Measured(

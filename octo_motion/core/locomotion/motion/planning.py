@@ -340,7 +340,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
-    job, carry, faces = _planned(job)
+    job, carry, faces = yield from evenly(_planning(job), 0.0)
     yield 0.0
     when = schedule(job)
     yield 0.0
@@ -459,8 +459,10 @@ def _along(
     return Carry(carry.unrolled if carry is not None else None, reach, carpet)
 
 
-def _planned(job: MotionJob) -> tuple[MotionJob, Carry | None, np.ndarray | None]:
-    """The same motion on its ground rolled out, where that has an up of its own; then which of its
+def _planning(
+    job: MotionJob,
+) -> Generator[None, None, tuple[MotionJob, Carry | None, np.ndarray | None]]:
+    """In steps, the same motion on its ground rolled out, where that has an up of its own; then which of its
     faces each one of the plan is from.
     """
     ground, route = job.ground, job.route
@@ -470,6 +472,7 @@ def _planned(job: MotionJob) -> tuple[MotionJob, Carry | None, np.ndarray | None
     reach, always = reach_of(job.creature), ground.stance.up == "GROUND"
     beyond = max(each.travel.stride for each in job.gaits) * reach + reach
     sizes = reach, beyond, always
+    yield
 
     def made() -> tuple[Unrolled, Floats, np.ndarray] | None:
         space = roll_out(route, mesh.triangles, reach=reach, beyond=beyond, always=always)

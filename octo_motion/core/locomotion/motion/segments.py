@@ -251,6 +251,7 @@ def standing_on(
     (ground, underfoot), warnings = yield from _finding_ground(
         job, route, travel, bearings, reach=reach, plane=plane, cyclic=cyclic, near=near
     )
+    yield 0.6
     line = body_line(
         *(route, travel, bearings, ground),
         clearance=_height(poser, job) * scale if height is None else height,

@@ -113,6 +113,7 @@ class Sketch:
         moment = plan.moment_of(frame)
         for anew in (False, True):
             yield from self._making(moment, anew=anew)
+            yield 0.9
         frames, times = (each[moment : moment + 1] for each in plan.moments)
         self._organs = frame, organs_at(plan, frames, body_at(plan, times).keyed, None)
 

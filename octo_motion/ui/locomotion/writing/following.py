@@ -221,6 +221,7 @@ class Following:
         yield 1.0
         yield from sketch.preparing(self._frame or 0.0)
         self.sketch = sketch
+        yield 1.0
 
     @property
     def has_news(self) -> bool:

@@ -327,7 +327,7 @@ def test_arms_that_open_otherwise_than_they_lie_belong_there_while_they_do() -> 
     group = crowd(one, other)
     share = np.linspace(0.0, 1.0, FRAMES)
     swum = replace(group, opened=Opened(np.array([-UP, UP]), share))
-    walked, opened = (Touching(each, []).now() for each in (group, swum))
+    walked, opened = (finished(Touching(each, []).seeing()) for each in (group, swum))
     first, last = (opened.side[:, opened.frame == frame] for frame in (0, FRAMES - 1))
     np.testing.assert_allclose(first, walked.side[:, walked.frame == 0], atol=1e-9)
     up_or_down = np.where(opened.arms[0] == 1, 1.0, -1.0)[opened.frame == FRAMES - 1]
