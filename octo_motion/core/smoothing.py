@@ -14,7 +14,7 @@ from .rotations import Floats
 
 def smooth_step(share: Floats) -> Floats:
     """``3t² − 2t³``: level at both ends."""
-    t = np.clip(share, 0.0, 1.0)
+    t = np.minimum(np.maximum(share, 0.0), 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
@@ -25,7 +25,7 @@ def least_jerk(share: Floats) -> Floats:
     coordination of arm movements", Journal of Neuroscience 5, 1985). Next to a rest nothing moves
     at first.
     """
-    t = np.clip(share, 0.0, 1.0)
+    t = np.minimum(np.maximum(share, 0.0), 1.0)
     return t * t * t * (10.0 + t * (6.0 * t - 15.0))
 
 

@@ -789,7 +789,7 @@ def _tell(curve: bpy.types.FCurve, filled: _Filled, channel: Channel) -> _Filled
     """Let Blender look at a curve's keys anew, and put its handles right."""
     curve.update()
     handles = _handles(curve) if channel.keys is not None else None
-    return replace(filled, handles=handles, told=True)
+    return _Filled(filled.count, filled.digest, handles, filled.had_own_handles)
 
 
 def _read_keys(curve: bpy.types.FCurve) -> dict[str, np.ndarray]:

@@ -34,7 +34,8 @@ def normalized(vectors: Floats) -> Floats:
 def cross(first: Floats, second: Floats) -> Floats:
     """Vector product (…, 3, batch)."""
     a, b = first, second
-    result = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    shape = a.shape if a.shape == b.shape else np.broadcast_shapes(a.shape, b.shape)
+    result = np.empty(shape)
     lost = np.empty((*result.shape[:-2], result.shape[-1]))
     for axis, (one, other) in enumerate(((1, 2), (2, 0), (0, 1))):
         part = result[..., axis, :]
@@ -76,7 +77,8 @@ def to_matrix(turn: Floats) -> Floats:
 
 def multiply(first: Floats, second: Floats) -> Floats:
     """Quaternions (4, batch) that turn by the second and then by the first."""
-    result = np.empty(np.broadcast_shapes(first.shape, second.shape))
+    alike = first.shape == second.shape
+    result = np.empty(first.shape if alike else np.broadcast_shapes(first.shape, second.shape))
     a, b, part = list(first), list(second), np.empty(result.shape[1:])
     for total, (begin, *rest) in zip(result, _HAMILTON, strict=True):
         np.multiply(a[begin[0]], b[begin[1]], out=total)

@@ -159,9 +159,7 @@ def lead_past(
     lying = [each > 0.0 for each in held]
     nobody = np.zeros(share.shape, dtype=bool)
     crowd = finished(
-        _Crowded.making(
-            volume, rotations, strains, in_contact=lying, busy=nobody, travel=travel
-        )
+        _Crowded.making(volume, rotations, strains, in_contact=lying, busy=nobody, travel=travel)
     )
     holds = np.stack([each.max(axis=1) for each in held], axis=1)
     passing = Passing(share, holds, crowd.crowd.in_contact.argmax(axis=2))
@@ -199,8 +197,7 @@ class _Crowded:
         travel: tuple[Floats, Floats],
         opened: Opened | None = None,
     ) -> Generator[None, None, _Crowded]:
-        """In steps, what arms with these rotations and strains, as in :func:`separating_arms`, are.
-        """
+        """In steps, what arms with these rotations and strains, as in :func:`separating_arms`, are."""
         some, chosen = _joints_chosen(volume.arms)
         posed = _Posed.of_all(volume.arms, rotations)
         yield

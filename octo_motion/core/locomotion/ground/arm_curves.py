@@ -518,7 +518,7 @@ def _heights(directions: Floats, lengths: Floats, roots: Floats, ground: Ground)
     joints[0] = roots
     np.multiply(lengths[:, None], directions, out=joints[1:])
     cumulative_sum(joints)
-    return joints[:, 2] - ground.height(np.moveaxis(joints, 1, -1))
+    return joints[:, 2] - ground.height(joints.swapaxes(1, 2))
 
 
 def _turn_up(directions: Floats, turn: Floats, level: Floats) -> None:

@@ -85,7 +85,8 @@ class BodyLine:
 
     def _at(self, table: Floats, distance: Floats) -> Floats:
         """The table at distances (…,), by the cubic through its neighbours' slopes."""
-        place = np.clip((distance - self.start) / self.spacing, 1.0, len(table) - 2.001)
+        place = (distance - self.start) / self.spacing
+        place = np.minimum(np.maximum(place, 1.0), len(table) - 2.001)
         index = place.astype(np.int64)
         t = (place - index).reshape(*place.shape, *[1] * (table.ndim - 1))
         before, here, then, after = (table[index + step] for step in (-1, 0, 1, 2))

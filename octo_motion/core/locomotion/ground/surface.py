@@ -30,6 +30,8 @@ _SIDE: Final = 16
 """Samples along a side of a face that is small."""
 _BLOCK: Final = 16
 """Samples: a ground's border lies at multiples of as many from the world's origin."""
+_BESIDE: Final = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+"""Ways in which it is looked for how a ground rises."""
 _MOST_SAMPLES: Final = 4_000_000
 """Samples of a ground; a longer route is sampled more coarsely."""
 _KINK: Final = 1.2
@@ -164,9 +166,10 @@ class HeightField:
     def slope(self, points: Floats) -> Floats:
         """Rise (…, 2), taken over a sample's width to either side, so that it does not jump."""
         at = points[..., :2]
-        step = self.spacing * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
-        around = self.height(at + step.reshape(4, *[1] * (at.ndim - 1), 2))
-        return np.moveaxis(around[:2] - around[2:], 0, -1) * (0.5 / self.spacing)
+        around = self.height(at + self.spacing * _BESIDE.reshape(4, *[1] * (at.ndim - 1), 2))
+        rise = around[:2] - around[2:]
+        rise *= 0.5 / self.spacing
+        return rise.transpose(*range(1, rise.ndim), 0)
 
     def moved(self, shift: Floats) -> HeightField:
         """The same elsewhere, by (3,) metres."""
@@ -310,9 +313,7 @@ def sample_ground(
 ) -> HeightField:
     """The same at once."""
     sizes = {"reach": reach, "spacing": spacing, "headroom": headroom, "gap": gap}
-    return finished(
-        sampling_ground(triangles, path, needed, **sizes, content=content, bare=bare)
-    )
+    return finished(sampling_ground(triangles, path, needed, **sizes, content=content, bare=bare))
 
 
 def _close(path: Floats, spacing: float) -> Floats:

@@ -330,7 +330,7 @@ class Route:
         start, hodograph = self.breaks[segment], np.diff(self.controls[..., :3], axis=1)
         degree = hodograph.shape[1] - 1
         powers = [
-            np.moveaxis(comb(degree, power) * np.diff(hodograph, power, axis=1)[segment, 0], -1, 0)
+            (comb(degree, power) * np.diff(hodograph, power, axis=1)[segment, 0]).T
             for power in range(degree, -1, -1)
         ]
         powers = [np.ascontiguousarray(each) for each in powers]
@@ -340,7 +340,9 @@ class Route:
             value = powers[0]
             for power in powers[1:]:
                 value = t * value + power
-            x, y, z = np.moveaxis(np.broadcast_to(value, (*s.shape[:-1], *value.shape[-2:])), -2, 0)
+            # Of straight lines it is the same at all nodes.
+            value = np.broadcast_to(value, (*s.shape[:-1], *value.shape[-2:]))
+            x, y, z = value[..., 0, :], value[..., 1, :], value[..., 2, :]
             return (degree + 1) / share * np.sqrt(x * x + y * y + z * z)
 
         return speed
