@@ -71,7 +71,7 @@ def read_markers(armature: bpy.types.Object, once: str = "") -> dict[tuple[str, 
     for item in markers(armature, once):
         own, world = _own(item), item.matrix_world
         place, put, known = world.translation, own.position, own.heading
-        far = max(abs(here - there) for here, there in zip(place, put, strict=True))
+        far = max(abs(place[axis] - put[axis]) for axis in range(3))
         moved = far > _MOVED * item.empty_display_size
         heading = _heading(world)
         turned = abs((heading - known + math.pi) % (2.0 * math.pi) - math.pi) > _MOVED

@@ -197,7 +197,9 @@ class _Crowded:
         travel: tuple[Floats, Floats],
         opened: Opened | None = None,
     ) -> Generator[None, None, _Crowded]:
-        """In steps, what arms with these rotations and strains, as in :func:`separating_arms`, are."""
+        """What arms with these rotations and strains, as in :func:`separating_arms`, are; in
+        steps.
+        """
         some, chosen = _joints_chosen(volume.arms)
         posed = _Posed.of_all(volume.arms, rotations)
         yield

@@ -510,10 +510,10 @@ def _finding_places(
     settings: StanceSettings,
     beside: Sequence[Floats],
 ) -> Generator[None, None, tuple[Floats, Floats, Floats, np.ndarray]]:
-    """In steps, where arms touch (arms, cycles, 3), which way they lie (arms, cycles, 2), half of how long
+    """Where arms touch (arms, cycles, 3), which way they lie (arms, cycles, 2), half of how long
     they do (arms, cycles), in cycles, and whether at all (arms, cycles); stances (arms, cycles) are
     shifted by so many cycles, and places are beside the usual ones by radians and arm lengths
-    (arms, cycles).
+    (arms, cycles). In steps.
     """
     limbs = path.limbs
     turns, away = path.timing.aims(limbs.arms, path.numbers)

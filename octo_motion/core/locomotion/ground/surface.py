@@ -467,7 +467,9 @@ def faces_of(triangles: Floats, ground: HeightField) -> np.ndarray:
 
 
 def _single(grid: HeightField, lowest: Floats, highest: Floats) -> HeightField | None:
-    """The ground, if no two faces are above each other; arguments as :func:`_finding_extent` returns."""
+    """The ground, if no two faces are above each other; arguments are as found by
+    :func:`_finding_extent`.
+    """
     there = np.isfinite(highest)
     # Where two faces meet, both are there.
     if np.max(highest[there] - lowest[there], initial=0.0) > _ONE * grid.spacing:

@@ -426,12 +426,10 @@ class GroundedWalk:
         self._last = first, last
         down = -body.rotation[:, 2]
         sides = [sucker_sides(skeleton, arm.bones, down) for arm in poser.arms]
-        # Where nothing varies at random, the seed does not matter.
-        seed = poser.settings.seed if any(poser.settings.variation) else 0
         self._ends = np.cumsum([0] + [len(arm.bones) for arm in poser.arms])
         self._found: list[WalkPart] = []
         self._laying = self._laying_footholds(
-            sides, radii, may_stretch, contact_overrides, skins, phases
+            sides, radii, may_stretch, contact_overrides, below=(skins, phases)
         )
 
     def laying(self) -> Generator[None, None, None]:
@@ -450,8 +448,8 @@ class GroundedWalk:
         radii: Sequence[Floats],
         may_stretch: Sequence[bool],
         contact_overrides: Sequence[ContactOverride],
-        skins: Sequence[ArmSkin],
-        phases: tuple[float, float],
+        *,
+        below: tuple[Sequence[ArmSkin], tuple[float, float]],
     ) -> Generator[None, None, None]:
         poser, ground, settings = self._poser, self._ground, self._settings
         # Where nothing varies at random, the seed does not matter.
@@ -479,11 +477,10 @@ class GroundedWalk:
                 )
                 parts.append(WalkPart(poser, ground, settings, sides, own, limbs, footholds))
         self._found = parts
-        if not _are_round(parts, skins):
-            below = self._below(skins, phases)
+        if not _are_round(parts, below[0]):
             self._found = [
                 replace(part, footholds=relaid(part.footholds, part.limbs, ground, own))
-                for part, own in zip(parts, below, strict=True)
+                for part, own in zip(parts, self._below(*below), strict=True)
             ]
 
     @property

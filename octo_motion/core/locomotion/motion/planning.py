@@ -462,8 +462,8 @@ def _along(
 def _planning(
     job: MotionJob,
 ) -> Generator[None, None, tuple[MotionJob, Carry | None, np.ndarray | None]]:
-    """In steps, the same motion on its ground rolled out, where that has an up of its own; then which of its
-    faces each one of the plan is from.
+    """The same motion on its ground rolled out, where that has an up of its own; then which of its
+    faces each one of the plan is from. In steps.
     """
     ground, route = job.ground, job.route
     if ground is None or ground.mesh is None or route is None or ground.stance.up == "WORLD":

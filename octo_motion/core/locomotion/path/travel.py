@@ -102,7 +102,7 @@ class Bearings:
 
     @cached_property
     def lap(self) -> float:
-        """Radians about travel by which the carried frame of a closed route has turned after a lap."""
+        """Radians about travel by which the carried frame of a closed route turns within a lap."""
         if not self.cyclic:
             return 0.0
         lap = multiply(conjugate(self._carried[0]), self._carried[-1])
