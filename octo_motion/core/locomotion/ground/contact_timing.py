@@ -126,16 +126,14 @@ def body_line(
         lean: 0 stays upright, 1 leans as the ground does, unless the settings have it.
         smoothing: reaches over which the ground is evened out along the way (standard deviation).
         under: metres from the body's centre to its lowest skin.
-        around: metres along the route from where to where the line is wanted, roughly, none for all
-            of it.
+        around: metres along the route from where to where it is roughly wanted, none for all.
     """
     spacing, width = reach / _HEIGHTS_PER_REACH, smoothing * reach
     margin = 2.0 * settings.stride + 4.0 * width + reach
     start, end = around or (0.0, route.length)
     count = int(np.ceil((end - start + 2.0 * margin) / spacing)) + 1
     distance = start - margin + spacing * np.arange(count)
-    coarse = around is not None
-    positions, turns = walked_at(route, settings, bearings, distance, coarse=coarse)
+    positions, turns = walked_at(route, settings, bearings, distance, coarse=around is not None)
     along, left = _ways(positions)
     felt = ground.height(positions[:, None, :2] + reach * _ACROSS[:, None] * left[:, None])
     kernel, share = _bell(width / spacing), distance / route.length

@@ -429,12 +429,10 @@ def laying(
     shape = len(limbs.arms), len(numbers)
     overridden = _overridden(limbs, shape, cycles[0], contact_overrides)
     late, *beside, bent = _differing(uneven, limbs, numbers)
-    shift = overridden.shift + late
+    shift, joint = overridden.shift + late, limbs.touching(settings.planted)
     roots = _RootPath(limbs, line, timing, numbers, middle / CYCLE)
     curl = _curls(limbs, 0 * numbers if cyclic else numbers, seed) + bent
-    joint = limbs.touching(settings.planted)
     spot, lie, half, firm = yield from _finding_places(roots, shift, ground, settings, beside)
-    yield
     spot, heading = overridden.put(spot, np.arctan2(lie[..., 1], lie[..., 0]))
     # As if they were round.
     skins = np.broadcast_to(limbs.radii[joint:].T[:, None], (*shape, len(limbs.radii) - joint))
@@ -536,6 +534,7 @@ def _finding_places(
     spot[..., :2] += distance[..., None] * aim
     half = half * _unturned(path, shift, half)
     spot, half, firm = _over_gaps(path, (shift, half), ground, settings, (spot, lie))
+    yield
     return spot, lie, half, firm
 
 

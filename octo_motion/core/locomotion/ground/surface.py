@@ -277,10 +277,7 @@ def sampling_ground(
     grid = HeightField((float(low[0]), float(low[1])), spacing, np.zeros((shape[0], shape[1])))
     content = content or content_key(triangles)
     key = content_key(content, grid.origin, spacing, shape)
-    if (known := _extents.known(key)) is None:
-        found = yield from _finding_extent(triangles, grid)
-        known = _extents.get(key, lambda: found)
-    lowest, highest = known
+    lowest, highest = yield from _finding_extent(triangles, grid, key)
     yield
     single = _single_known.get(key, lambda: _single(grid, lowest, highest))
     if single is not None:
@@ -442,17 +439,20 @@ def _nearest(grid: HeightField, points: Floats) -> tuple[np.ndarray, np.ndarray]
 
 
 def _finding_extent(
-    triangles: Floats, grid: HeightField
+    triangles: Floats, grid: HeightField, key: bytes
 ) -> Generator[None, None, tuple[Floats, Floats]]:
     """Lowest and highest of all faces at each sample (nx, ny); +∞ and −∞ where there is none. In
-    steps.
+    steps, if they are not known by their key.
     """
+    if (known := _extents.known(key)) is not None:
+        return _extents.get(key, lambda: known)
     lowest, highest = np.full(grid.heights.size, np.inf), np.full(grid.heights.size, -np.inf)
     for place, z, _ in _hits(triangles, grid):
         np.minimum.at(lowest, place, z)
         np.maximum.at(highest, place, z)
         yield
-    return lowest.reshape(grid.heights.shape), highest.reshape(grid.heights.shape)
+    made = lowest.reshape(grid.heights.shape), highest.reshape(grid.heights.shape)
+    return _extents.get(key, lambda: made)
 
 
 def faces_of(triangles: Floats, ground: HeightField) -> np.ndarray:

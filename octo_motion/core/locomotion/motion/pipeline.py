@@ -199,8 +199,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     on_frames = arms.at(slice(None, None, every))
     # The ground is as it was planned on.
     planned, along = posed.planned or (arms, posed.going)
-    framed = along[0][::every], along[1][::every]
-    stays = keyed[0][::every], keyed[1][::every]
+    framed, stays = ((each[0][::every], each[1][::every]) for each in (along, keyed))
     measuring = _measuring(plan, planned.at(slice(None, None, every)), framed, stays)
     measured, overlaps = yield from evenly(measuring, moving)
     if measured is not None and plan.carry is not None:

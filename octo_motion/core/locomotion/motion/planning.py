@@ -343,7 +343,6 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     job, carry, faces = yield from evenly(_planning(job), 0.0)
     yield 0.0
     when = schedule(job)
-    yield 0.0
     route, lean = when.route, when.lean
     plane = _lowest(route) if isinstance(job.changes, ChangesByHeight) else None
     changes = bool(job.changes) and not job.in_place
@@ -364,13 +363,10 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     else:
         # Contacts are places in the world; in place the ground goes by.
         asked = () if job.in_place else overrides
-        walk = standing.walk(standing.line, asked) if standing is not None else None
-        if walk is not None:
-            yield from evenly(walk.laying(), 0.6)
+        walk = (yield from evenly(standing.walking(asked), 0.6)) if standing else None
         segments = Segments(gaits, [walk], None, [len(each) for each in job.creature.bones], route)
     yield 0.8
     pace = pace_of(route, when.travel, when.seconds * job.timing.rate)
-    yield 0.8
     warnings = [*job.warnings, *(standing.warnings if standing is not None else ())]
     if standing is not None or changes:
         warnings += too_few_frames(job.timing, pace)

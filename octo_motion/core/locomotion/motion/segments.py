@@ -174,6 +174,12 @@ class Standing:
             skins=self.job.skins,
         )
 
+    def walking(self, overrides: Sequence[ContactOverride]) -> Generator[None, None, GroundedWalk]:
+        """The same on this body's own way, its footholds laid in steps."""
+        walk = self.walk(self.line, overrides)
+        yield from walk.laying()
+        return walk
+
 
 @dataclass(frozen=True, eq=False)
 class Nearby:

@@ -340,9 +340,7 @@ class Route:
             value = powers[0]
             for power in powers[1:]:
                 value = t * value + power
-            # Of straight lines it is the same at all nodes.
-            value = np.broadcast_to(value, (*s.shape[:-1], *value.shape[-2:]))
-            x, y, z = value[..., 0, :], value[..., 1, :], value[..., 2, :]
+            x, y, z = np.moveaxis(np.broadcast_to(value, (*s.shape[:-1], *value.shape[-2:])), -2, 0)
             return (degree + 1) / share * np.sqrt(x * x + y * y + z * z)
 
         return speed
