@@ -117,10 +117,11 @@ _STEPS: Final = 4
 """Newton's steps that draw an arm back to where it holds on."""
 _TORN: Final = 2e-5
 """Arm lengths by which an arm may miss that place; one that misses it more is left as it was."""
-_HOPELESS: Final = (1.0, 1.25)
-"""Shares of how deep arms were in each other before, between which they are left as they were …"""
 _SHALLOW: Final = 0.5
-"""… where they are deeper than this share of the thinner radius."""
+"""Share of the thinner radius up to which it does not matter that arms are as deep in each other as
+they were."""
+_TOO_MUCH: Final = (1.1, 1.25)
+"""Shares of what is allowed, between which arms go back to as they were."""
 _MOSTLY: Final = 0.5
 """Share of all frames from which on two capsules that overlap belong together."""
 _REPEATS: Final = 3
@@ -455,19 +456,17 @@ class _Parting:
 
     def _hopeless(self, touches: Touches) -> Floats:
         """Which arms (frames, arms) could not make way, or not without a jump, 0…1."""
-        around = blur_reach(self._width)
-        before = widened(self._depths_before, around, cyclic=self._cyclic)
-        before = np.maximum(before, _SHALLOW)
-        low, high = _HOPELESS
-        result = smooth_step((self._depths(touches) / before - low) / (high - low))
+        before = widened(self._depths_before, blur_reach(self._width), cyclic=self._cyclic)
+        result = _beyond(self._depths(touches) / np.maximum(before, _SHALLOW))
         changed = self._changed()
         most = max(float(self._turns_before.max(initial=0.0)), self._most)
-        swift = self._turns_before > most
+        turns = self._turns_before.copy()
         # Between two frames of which neither has changed it turns as it did.
         anew = np.nonzero(changed[:-1] | changed[1:])
-        ends = self._directions[:-1][anew], self._directions[1:][anew]
-        swift[anew] = _turns(*ends) > most
-        result[1:][swift] = result[:-1][swift] = 1.0
+        turns[anew] = _turns(self._directions[:-1][anew], self._directions[1:][anew])
+        swift = _beyond(turns / most)
+        result[1:] = np.maximum(result[1:], swift)
+        result[:-1] = np.maximum(result[:-1], swift)
         result[self._room.min(axis=2) < -TOLERATED * self._length] = 1.0
         return np.where(changed | (result < 1.0), result, 0.0)
 
@@ -524,10 +523,31 @@ def _within(before: Floats, after: Floats, free: Floats) -> Floats:
     return _unit(before + share[..., None] * away)
 
 
+def _beyond(shares: Floats) -> Floats:
+    """How far (…) is to be taken back what is so much (…) of what is allowed, 0…1."""
+    low, high = _TOO_MUCH
+    return smooth_step((shares - low) / (high - low))
+
+
 def _turns(first: Floats, second: Floats) -> Floats:
-    """How far (…) a segment turns at most, radians, from directions (…, segments, 3) to others."""
-    chord = _length(second - first).max(axis=-1, initial=0.0)
-    return 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
+    """How far (…) a segment turns at most against the one before it, radians, from directions
+    (…, segments, 3) at a frame to those at the next.
+    """
+    one, other = np.moveaxis(first, -1, 0), np.moveaxis(second, -1, 0)
+    # The one before, turned the shortest way to where it is a frame later, takes the next along.
+    (sx, sy, sz), (ex, ey, ez), (x, y, z) = one[..., :-1], other[..., :-1], one[..., 1:]
+    ax, ay, az = sy * ez - sz * ey, sz * ex - sx * ez, sx * ey - sy * ex
+    beyond = 1.0 / np.maximum(1.0 + sx * ex + sy * ey + sz * ez, 1e-6)
+    cx, cy, cz = ay * z - az * y, az * x - ax * z, ax * y - ay * x
+    taken = (
+        x + cx + (ay * cz - az * cy) * beyond,
+        y + cy + (az * cx - ax * cz) * beyond,
+        z + cz + (ax * cy - ay * cx) * beyond,
+    )
+    left = [end - start for end, start in zip(other[..., 1:], taken, strict=True)]
+    squares = left[0] * left[0] + left[1] * left[1] + left[2] * left[2]
+    own = _length(second[..., 0, :] - first[..., 0, :])
+    return np.maximum(own, np.sqrt(squares.max(axis=-1, initial=0.0)))
 
 
 def _anchors(in_contact: np.ndarray) -> np.ndarray:
