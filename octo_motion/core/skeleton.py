@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Final
 
@@ -84,6 +84,9 @@ class Skeleton:
     bendy_segments: tuple[int, ...]
     sucker_axes: tuple[str, ...]
     """Local axis that the suckers face ("-Z", "+X", …), or "" where the rig does not say."""
+    tips: Mapping[str, float] = field(default_factory=dict)
+    """Lengths of bones that are the last of an arm, by their skin, where it goes on beyond their
+    tails: files of other programs know no tails."""
 
     def __len__(self) -> int:
         """Number of bones."""

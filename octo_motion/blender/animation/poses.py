@@ -114,7 +114,8 @@ def as_posed(
     # The turns of what is sheared, as near as can be.
     before, _, after = np.linalg.svd(axes)
     matrices[:, :3, :3] = before @ after
-    return replace(skeleton, rest_matrices=matrices, lengths=skeleton.lengths * sizes)
+    tips = {name: far * float(sizes[skeleton.index[name]]) for name, far in skeleton.tips.items()}
+    return replace(skeleton, rest_matrices=matrices, lengths=skeleton.lengths * sizes, tips=tips)
 
 
 def displaced_bones(

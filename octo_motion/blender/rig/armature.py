@@ -552,6 +552,10 @@ _REACHED: Final = 0.02
 """Share of a part's vertices at either end that stand out of it."""
 _MUCH: Final = 1.5
 """How much larger a part about its bone may be than one about its own longest way."""
+_BEYOND: Final = 1.1
+"""Lengths of an arm's last bone that its skin reaches at least to count as going beyond it."""
+_TOP: Final = 0.8
+"""Share of that skin's reach from which on it is its tip."""
 _ROUNDED: Final = 1e-6
 """To which a skin's place on its armature is known."""
 _BONE_ROOT, _BONE_TIP = 0.06, 0.012
@@ -605,6 +609,34 @@ def radii_of_skin(armature: bpy.types.Object, chains: Sequence[Sequence[str]]) -
         distances.setdefault(name, []).append(np.linalg.norm(off, axis=1))
     measured = {name: np.concatenate(each) for name, each in distances.items()}
     return [_of_chain(bones, chain, measured) for chain in chains]
+
+
+def with_tips(
+    armature: bpy.types.Object, skeleton: Skeleton, arms: Sequence[Sequence[str]]
+) -> Skeleton:
+    """The same skeleton with arms (bones, root to tip) that end where their skin does."""
+    ends = {bones[-1]: joint_positions(skeleton, bones)[-2:] for bones in arms}
+    found: dict[str, list[Floats]] = {name: [] for name in ends}
+    for name, points in _followers(armature):
+        if name in found:
+            found[name].append(points)
+    tips: dict[str, float] = {}
+    for name, each in found.items():
+        points, (head, tail) = np.concatenate([np.zeros((0, 3)), *each]), ends[name]
+        length = float(np.linalg.norm(tail - head))
+        if len(points) < _FEW or length == 0.0:
+            continue
+        along = (points - head) @ (tail - head) / length
+        top = along >= _TOP * along.max()
+        off = points[top] - head - along[top, None] * (tail - head) / length
+        # A round end lies on its own middle.
+        far = float(along.max() - np.quantile(np.linalg.norm(off, axis=1), _MOST))
+        if far > _BEYOND * length:
+            tips[name] = far
+    if not tips:
+        return skeleton
+    longer = replace(skeleton, tips=tips)
+    return _known.get(longer.content, lambda: longer)
 
 
 def skin_parts(

@@ -172,7 +172,8 @@ def joint_positions(skeleton: Skeleton, bones: Sequence[str]) -> Floats:
     """Joints P₀ … Pₙ of an arm at rest, (bones + 1, 3), armature space.
 
     The last joint is the last bone's tail if the chain's tails lie where the next bones begin.
-    In many imported rigs they do not: there it continues the last segment, as long as that is.
+    In many imported rigs they do not: there it continues the last segment, as long as that is. An
+    arm whose skin goes on beyond that is as long as its skin.
 
     Raises:
         RigError: a bone does not exist.
@@ -187,6 +188,8 @@ def joint_positions(skeleton: Skeleton, bones: Sequence[str]) -> Floats:
         tip = tails[-1]
     else:
         tip = heads[-1] + segments[-1]
+    if far := skeleton.tips.get(bones[-1], 0.0):
+        tip = heads[-1] + far * normalized(tip - heads[-1])
     return np.concatenate([heads, tip[None]])
 
 

@@ -29,6 +29,7 @@ from ....blender.rig import (
     read_skeleton,
     skin_key,
     skin_parts,
+    with_tips,
     world_directions,
 )
 from ....core.content_cache import ContentCache, content_key
@@ -184,6 +185,7 @@ def read_creature(
     for arm in arms:
         # Complains of bones that are gone.
         chain_of(skeleton, arm.bones)
+    skeleton = at_rest = with_tips(armature, at_rest, [arm.bones for arm in arms])
     turned = [bone for arm in arms for bone in arm.bones]
     carriers: list[str] = []
     if settings.keep_pose:
