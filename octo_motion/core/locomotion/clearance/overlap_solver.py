@@ -120,7 +120,7 @@ _TORN: Final = 2e-5
 _SHALLOW: Final = 0.5
 """Share of the thinner radius up to which it does not matter that arms are as deep in each other as
 they were."""
-_TOO_MUCH: Final = (1.1, 1.25)
+_TOO_MUCH: Final = (1.02, 1.05)
 """Shares of what is allowed, between which arms go back to as they were."""
 _MOSTLY: Final = 0.5
 """Share of all frames from which on two capsules that overlap belong together."""
