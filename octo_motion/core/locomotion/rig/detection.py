@@ -447,7 +447,8 @@ def _stands_off_one_body(tree: BoneTree, family: tuple[BoneChain, ...]) -> bool:
         above = tree.parents[attachment]
         while above >= 0:
             if above in attachments:
-                of_a_kind = len({len(chain) for chain in family}) == 1
+                counts = [len(chain) for chain in family]
+                of_a_kind = max(counts) - min(counts) <= 1
                 return of_a_kind and _paired(family) >= _ARMS_ALONG_SPINE
             above = tree.parents[above]
     return True

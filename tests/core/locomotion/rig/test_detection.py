@@ -402,6 +402,18 @@ def test_legs_of_an_insect_along_its_spine_count_as_arms() -> None:
     assert len(detect(rig).arms) == 6
 
 
+def test_arms_of_a_squid_in_bunches_along_its_body_count_as_arms() -> None:
+    """Those in the middle of a bunch have a bone less than those beside them."""
+    rig = Rig()
+    rig.bone("mantle", (0, 2, 0), (0, 0, 0))
+    for bunch, z in (("middle", 0.0), ("upper", 0.3), ("lower", -0.3)):
+        rig.bone(bunch, (0, 0, z), (0, -0.2, z), "mantle" if bunch == "middle" else "middle")
+        for place, count in ((-1, 5), (0, 4), (1, 5)):
+            names = [f"{bunch}{place}_{number}" for number in range(count)]
+            rig.chain(names, (0.2 * place, -0.2, z), (0.3 * place, -3.0, z), bunch)
+    assert len(detect(rig).arms) == 9
+
+
 def test_arms_upright_in_the_middle_get_no_side_and_the_artist_is_told() -> None:
     rig = Rig()
     rig.bone("body", (0, 0, -0.5), (0, 0, 0))
