@@ -157,7 +157,7 @@ def _places() -> dict[str, list[Place]]:
         "lay down what holds on": [(walk.GroundedWalk, "posing")],
         "let turns take their time": [(computing, "_take_time")],
         "body, mantle, siphon, eyes": [(planning, "_self_motion"), (computing, "organs_at")],
-        "off the ground between frames": [(computing, "_cleared")],
+        "off the ground between frames": [(computing, "_clearing")],
         "keep arms apart": [(computing, "_separate")],
         "measure the figures": [(computing, "_measured"), (computing, "finding_figures")],
         "handles, few keys": [(computing, "_reduced"), (computing, "measuring_keyed")],

@@ -627,6 +627,8 @@ def with_tips(
         if len(points) < _FEW or length == 0.0:
             continue
         along = (points - head) @ (tail - head) / length
+        if along.max() <= length:
+            continue
         top = along >= _TOP * along.max()
         off = points[top] - head - along[top, None] * (tail - head) / length
         # A round end lies on its own middle.

@@ -537,7 +537,7 @@ class Touching:
         ]
         return parts_of([*self._chains(joints), *body])
 
-    def seeing(self) -> Generator[None, None, Touches]:
+    def seeing(self) -> Generator[float, None, Touches]:
         """What overlaps while nobody has made way yet; in steps."""
         points = self._points(self._crowd.joints)
 
@@ -548,7 +548,7 @@ class Touching:
         found = [self._at(points, np.zeros((3, 0), dtype=np.intp))]
         for each in near(self._middles, self._pairs, overlapping):
             found.append(each)
-            yield
+            yield 0.0
         return all_of(found)
 
     def look_at(self, frames: np.ndarray, without: np.ndarray) -> None:

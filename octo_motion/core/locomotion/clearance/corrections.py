@@ -24,7 +24,7 @@ from ...rotations import (
     shortest_arc,
 )
 from ...smoothing import covered, smooth_step, spans
-from ...steps import evenly, finished
+from ...steps import finished
 from ..ground import Ground, raise_over_ground
 from ..rig import (
     TOLERATED,
@@ -118,7 +118,7 @@ def separating_arms(
     making = _Crowded.making(
         volume, rotations, strains, in_contact=in_contact, busy=busy, travel=travel, opened=opened
     )
-    crowd = yield from evenly(making, 0.0)
+    crowd = yield from making
     yield 0.0
     moved = yield from parting(
         crowd.crowd,
@@ -196,17 +196,17 @@ class _Crowded:
         busy: np.ndarray,
         travel: tuple[Floats, Floats],
         opened: Opened | None = None,
-    ) -> Generator[None, None, _Crowded]:
+    ) -> Generator[float, None, _Crowded]:
         """What arms with these rotations and strains, as in :func:`separating_arms`, are; in
         steps.
         """
         some, chosen = _joints_chosen(volume.arms)
         posed = _Posed.of_all(volume.arms, rotations)
-        yield
+        yield 0.0
         joints = np.empty((len(rotations), len(volume.arms), len(chosen[0]), 3))
         for each in posed:
             joints[:, each.numbers] = each.joints(strains)[:, :, chosen[each.numbers[0]]]
-            yield
+            yield 0.0
         crowd = Crowd(
             joints=joints,
             radii=np.stack([own[which] for own, which in zip(volume.radii, chosen, strict=True)]),

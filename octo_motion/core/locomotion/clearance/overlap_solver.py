@@ -26,7 +26,6 @@ from ...content_cache import part_of
 from ...rotations import Floats
 from ...rotations.components_first import dot
 from ...smoothing import blur_reach, blurred, covered, smooth_step, widened
-from ...steps import evenly
 from ..ground import drawn
 from ..rig import TOLERATED, lowest_allowed
 from .capsule_overlap import Capsules, Crowd, Touches, Touching, all_of, aside, portions
@@ -165,7 +164,7 @@ def parting(
         return None
     touching = Touching(crowd, still)
     yield 0.0
-    touches = yield from evenly(touching.seeing(), 0.0)
+    touches = yield from touching.seeing()
     yield 0.0
     chosen = touches.depth > _DONE
     pairs, counts = np.unique(touches.pair[chosen], return_counts=True)

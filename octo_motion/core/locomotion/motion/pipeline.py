@@ -16,7 +16,6 @@ import numpy as np
 from ...keyframes import Channel
 from ...phrases import phrase
 from ...rotations import IDENTITY, Floats, conjugate, from_matrix, multiply, rotate, slerp
-from ...steps import evenly
 from ..body import BodyMoments, OrganPoses, pose_organs
 from ..clearance import (
     ArmsOverGround,
@@ -201,7 +200,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     planned, along = posed.planned or (arms, posed.going)
     framed, stays = ((each[0][::every], each[1][::every]) for each in (along, keyed))
     measuring = _measuring(plan, planned.at(slice(None, None, every)), framed, stays)
-    measured, overlaps = yield from evenly(measuring, moving)
+    measured, overlaps = yield from scaled(measuring, moving, moving)
     if measured is not None and plan.carry is not None:
         measured = _rolled_up(plan, measured, posed)
     # A key at every moment, unless fewer say the same.
@@ -318,7 +317,7 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     made = yield from segments.compute(travel, body.places, step, frames_per_metre, cyclic=cyclic)
     # Each of these takes a while; who works in turns looks about in between.
     yield 0.9
-    arms = yield from evenly(_clearing(plan, made, going, cyclic=cyclic), 0.9)
+    arms = yield from scaled(_clearing(plan, made, going, cyclic=cyclic), 0.9, 0.9)
     yield 0.93
     swimming = segments.swimming(travel.distance)
     # What is reached for is in the world.

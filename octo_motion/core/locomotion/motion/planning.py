@@ -16,7 +16,6 @@ from ...errors import SettingsError
 from ...phrases import phrase
 from ...rotations import Floats, multiply, normalized, rotate
 from ...skeleton import Skeleton
-from ...steps import evenly
 from ..body import BodyTrack, Holds, SelfMotion, Stalking, Surge, self_motion, steps_of, surge
 from ..gait import (
     CYCLE,
@@ -323,15 +322,17 @@ _Outcome = TypeVar("_Outcome")
 
 
 def scaled(
-    steps: Generator[float, None, _Outcome], start: float, end: float
+    steps: Generator[float | None, None, _Outcome], start: float, end: float
 ) -> Generator[float, None, _Outcome]:
-    """Steps that are a part of the whole work, from one share of it to another."""
+    """Steps that are a part of the whole work, from one share of it to another, or that do not say
+    how far they are.
+    """
     while True:
         try:
             share = next(steps)
         except StopIteration as last:
             return last.value
-        yield start + (end - start) * share
+        yield start + (end - start) * (share or 0.0)
 
 
 def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
@@ -340,7 +341,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
-    job, carry, faces = yield from evenly(_planning(job), 0.0)
+    job, carry, faces = yield from scaled(_planning(job), 0.0, 0.0)
     yield 0.0
     when = schedule(job)
     route, lean = when.route, when.lean
@@ -363,7 +364,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     else:
         # Contacts are places in the world; in place the ground goes by.
         asked = () if job.in_place else overrides
-        walk = (yield from evenly(standing.walking(asked), 0.6)) if standing else None
+        walk = (yield from scaled(standing.walking(asked), 0.6, 0.6)) if standing else None
         segments = Segments(gaits, [walk], None, [len(each) for each in job.creature.bones], route)
     yield 0.8
     pace = pace_of(route, when.travel, when.seconds * job.timing.rate)
