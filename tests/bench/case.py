@@ -159,7 +159,7 @@ def _places() -> dict[str, list[Place]]:
         "body, mantle, siphon, eyes": [(planning, "_self_motion"), (computing, "organs_at")],
         "off the ground between frames": [(computing, "_clearing")],
         "keep arms apart": [(computing, "_separate")],
-        "measure the figures": [(computing, "_measured"), (computing, "finding_figures")],
+        "measure the figures": [(computing, "_measuring"), (computing, "finding_figures")],
         "handles, few keys": [(computing, "_reduced"), (computing, "measuring_keyed")],
         "values of the channels": [(computing, "_motion")],
         "write keys": [(actions, "_fill_dense"), (actions, "_fill_bezier"), (actions, "_tell")],

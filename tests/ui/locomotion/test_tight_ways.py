@@ -112,5 +112,5 @@ def test_no_arm_starts_suddenly_where_it_lets_go_between_others(
     scene = build("walk", "slope")
     played = record(scene.armature, moments(scene.start, scene.end), with_skin=False)
     assert measures.sudden_starts(played) == 0
-    # 21.8 before, 18.1 now.
-    assert measures.turns(played).value < 20.0
+    # 21.8 before; 18.1 as long as arms went through each other instead, by 1.4 radii; 20.8 now.
+    assert measures.turns(played).value < 21.5
