@@ -125,16 +125,24 @@ def generate(armature: Any) -> Any:
     return armature.animation_data.action
 
 
+def curves(action: Any) -> list[Any]:
+    """All curves of an action."""
+    return [
+        curve
+        for layer in action.layers
+        for strip in layer.strips
+        for bag in strip.channelbags
+        for curve in bag.fcurves
+    ]
+
+
 def keys(action: Any) -> dict[tuple[str, int], np.ndarray]:
     """All keys of an action, (n, 2) frame and value, by path and component."""
     found = {}
-    for layer in action.layers:
-        for strip in layer.strips:
-            for channelbag in strip.channelbags:
-                for curve in channelbag.fcurves:
-                    values = np.empty(2 * len(curve.keyframe_points), dtype=np.float32)
-                    curve.keyframe_points.foreach_get("co", values)
-                    found[curve.data_path, curve.array_index] = values.reshape(-1, 2)
+    for curve in curves(action):
+        values = np.empty(2 * len(curve.keyframe_points), dtype=np.float32)
+        curve.keyframe_points.foreach_get("co", values)
+        found[curve.data_path, curve.array_index] = values.reshape(-1, 2)
     return found
 
 

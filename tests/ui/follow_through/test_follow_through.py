@@ -11,6 +11,7 @@ import pytest
 
 from octo_motion.ui.follow_through import follow_settings
 from octo_motion.ui.follow_through.following import FollowSession
+from tests.ui.rig import curves
 
 BONES = [f"Tail.{number}" for number in range(1, 6)]
 FRAMES = 25
@@ -45,24 +46,13 @@ def make_fox(*, scale: float = 1.0, mode: str = "QUATERNION") -> Any:
     return armature
 
 
-def fcurves(action: Any) -> list[Any]:
-    """Of all its slots."""
-    return [
-        curve
-        for layer in action.layers
-        for strip in layer.strips
-        for bag in strip.channelbags
-        for curve in bag.fcurves
-    ]
-
-
 def keys(action: Any) -> dict[tuple[str, int], list[tuple[float, ...]]]:
     """All that an action's keys are."""
     return {
         (curve.data_path, curve.array_index): [
             (*key.co, *key.handle_left, *key.handle_right) for key in curve.keyframe_points
         ]
-        for curve in fcurves(action)
+        for curve in curves(action)
     }
 
 
@@ -212,7 +202,7 @@ def test_cycle_meets_its_beginning() -> None:
 def test_loop_that_nothing_marks_as_one_meets_its_beginning(last: int) -> None:
     """Clips from files: whether they are loops is seen from their ends alone."""
     fox = make_fox()
-    for curve in fcurves(bpy.data.actions["Wag"]):
+    for curve in curves(bpy.data.actions["Wag"]):
         for key in reversed(curve.keyframe_points):
             if key.co.x > last:
                 curve.keyframe_points.remove(key)

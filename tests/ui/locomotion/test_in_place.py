@@ -12,20 +12,10 @@ from octo_motion.core.locomotion.gait.table import gait_presets
 from octo_motion.core.locomotion.metrics import report as quality
 from octo_motion.core.locomotion.path.travel import plan_travel
 from tests.ui.made import prepare
-from tests.ui.rig import Octopus, generate, joints_in_world, keys, still
+from tests.ui.rig import Octopus, curves, generate, joints_in_world, keys, still
 
 OCTOPUS = Octopus(settings={"travel_on": "NONE", "cycle_time": 1.0})
 """It has no route."""
-
-
-def curves(action: Any) -> list[Any]:
-    return [
-        curve
-        for layer in action.layers
-        for strip in layer.strips
-        for bag in strip.channelbags
-        for curve in bag.fcurves
-    ]
 
 
 @pytest.mark.parametrize("gait", sorted(gait_presets()))
