@@ -160,7 +160,7 @@ def _places() -> dict[str, list[Place]]:
         "off the ground between frames": [(computing, "_clearing")],
         "keep arms apart": [(computing, "_separate")],
         "measure the figures": [(computing, "_measuring"), (computing, "finding_figures")],
-        "handles, few keys": [(computing, "_reduced"), (computing, "measuring_keyed")],
+        "handles, few keys": [(computing, "reduced"), (computing, "measuring_keyed")],
         "values of the channels": [(computing, "_motion")],
         "write keys": [(actions, "_fill_dense"), (actions, "_fill_bezier"), (actions, "_tell")],
         "fingerprint of the keys": [(actions, "_keys_digest"), (actions, "_fingerprint")],
