@@ -13,6 +13,8 @@ from .recording import Flags, Floats, Integers
 
 _UPRIGHT = 1e-9
 """Square metres on the map: less is a wall, that nothing stands on."""
+_AT_ONCE = 1 << 20
+"""Points: all of a skin over a thousand moments would fill gigabytes several times."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,12 +61,20 @@ class Surface:
 
     def near(self, points: Floats, height: float = 0.0) -> Flags:
         """Which points (…, 3) may be less than so high over the ground: a quick look."""
-        cells, inside = self._cells(points)
-        return inside & (points[..., 2] - height < self.ceiling[cells])
+        flat = points.reshape(-1, 3)
+        found = np.empty(len(flat), bool)
+        for few in _few(len(flat)):
+            cells, inside = self._cells(flat[few])
+            found[few] = inside & (flat[few, 2] - height < self.ceiling[cells])
+        return found.reshape(points.shape[:-1])
 
     def heights(self, points: Floats) -> Floats:
         """How high the ground is under points (…, 3), metres; -inf beside it."""
         flat = points.reshape(-1, 3)
+        found = [self._heights(flat[few]) for few in _few(len(flat))]
+        return np.concatenate([*found, np.empty(0)]).reshape(points.shape[:-1])
+
+    def _heights(self, flat: Floats) -> Floats:
         cells, inside = self._cells(flat)
         heights = np.full(len(flat), -np.inf)
         for column in self.listed.T:
@@ -79,7 +89,7 @@ class Surface:
             z = a[:, 2] + s * u[:, 2] + t * v[:, 2]
             rows = some[over]
             heights[rows] = np.maximum(heights[rows], z[over])
-        return heights.reshape(points.shape[:-1])
+        return heights
 
     def depths(self, points: Floats) -> Floats:
         """How far points (…, 3) are below the surface, metres; negative, or -inf, above it.
@@ -101,6 +111,10 @@ class Surface:
         places = np.floor((points[..., :2] - self.low) / self.cell).astype(int)
         inside = np.all((places >= 0) & (places < self.shape), axis=-1)
         return np.where(inside, places[..., 0] * self.shape[1] + places[..., 1], 0), inside
+
+
+def _few(count: int) -> list[slice]:
+    return [slice(start, start + _AT_ONCE) for start in range(0, count, _AT_ONCE)]
 
 
 def _listed(triangles: Floats, low: Floats, cell: float, shape: tuple[int, int]) -> Integers:
