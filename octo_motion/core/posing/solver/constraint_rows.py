@@ -7,7 +7,7 @@ within Coulomb's cone |p_t| ≤ μ p_n. With a gain a, the gap g and the last st
 
     y_n = −a (w_n + g/h),   y_t = b − a w_t
     apart    p = 0                                                 where μ |y_t| < −y_n
-    sticks   p = y                                                 where |y_t| ≤ μ y_n
+    sticks   p = y                                                 where |y_t| < μ y_n
     slips    p_n = (y_n + μ |y_t|)/(1 + μ²),  p_t = μ p_n y_t/|y_t|     between
 
 or p = P(y), the nearest point of a cone, with y = y₀ − a w. Stretching y stretches p alike, so that
@@ -39,6 +39,7 @@ _LEAST_SHARE = 0.002
 _WEIGHT = 9.81
 _TINY = 1e-300
 _UNIT = np.eye(3)
+_FLAT = np.eye(2)
 _ONES = np.ones(3)
 
 
@@ -163,15 +164,8 @@ class Pattern:
         self.friction = friction
         self.slipping = friction / self.contact_gains
         self.spread = 1.0 / (1.0 + friction * friction)
-        self.root_spread = float(np.sqrt(self.spread))
-        self._crossed: Floats | None = None
-        self._crossing = np.zeros((0, 3, 3))
-
-    def crossing(self, normals: Floats) -> Floats:
-        """(contacts, 3, 3) matrices of n ×."""
-        if normals is not self._crossed:
-            self._crossed, self._crossing = normals, skew(normals)
-        return self._crossing
+        self.along = self.spread * np.array([[1.0, friction], [friction, friction * friction]])
+        """(2, 2) in n and t, what a slipping contact answers along the edge of its cone."""
 
     def fits(self, contacts: Contacts, holds: Holds | None) -> bool:
         """Whether the same bodies touch and are held, in the same way."""
@@ -336,7 +330,8 @@ class Rows:
         push = (y * normals) @ _ONES
         across = y - push[:, None] * normals
         size = np.sqrt((across * across) @ _ONES)
-        sticks = size <= friction * push
+        # Less, not equal: without friction nothing sticks, and what is apart is not drawn.
+        sticks = size < friction * push
         lift = push + friction * size
         slips = (lift > 0.0) > sticks
         if not np.count_nonzero(slips):
@@ -379,19 +374,19 @@ class Rows:
 
     def _cones(self, answer: RowImpulses, planes: Floats) -> None:
         """Fill in P′ of the contacts (contacts, 3, 3)."""
-        np.multiply(answer.sticks[:, None, None], _UNIT, out=planes)
         if answer.slips is None:
+            np.multiply(answer.sticks[:, None, None], _UNIT, out=planes)
             return
-        contacts, pattern = self.contacts, self.pattern
-        # Along n + μ t with 1/(1 + μ²), sideways of both with |p_t|/|y_t|.
-        toward = answer.across / (answer.size + _TINY)[:, None]
-        ways = np.empty((len(toward), 3, 2))
-        both = contacts.normals + pattern.friction * toward
-        np.multiply(both, (answer.slips * pattern.root_spread)[:, None], out=ways[:, :, 0])
-        aside = np.sqrt(answer.slips * answer.shares)
-        sideways = (pattern.crossing(contacts.normals) @ toward[:, :, None])[:, :, 0]
-        np.multiply(sideways, aside[:, None], out=ways[:, :, 1])
-        planes += ways @ ways.transpose(0, 2, 1)
+        # Where it slips, 1/(1 + μ²) along n + μ t, |p_t|/|y_t| sideways of n and t:
+        # c 1 + (n + μ t)(n + μ t)ᵀ/(1 + μ²) − c (n nᵀ + t tᵀ) = c 1 + [n t] k [n t]ᵀ.
+        pattern, shares = self.pattern, answer.shares
+        plane = np.empty((len(shares), 2, 3))
+        plane[:, 0] = self.contacts.normals
+        np.divide(answer.across, (answer.size + _TINY)[:, None], out=plane[:, 1])
+        inner = pattern.along - shares[:, None, None] * _FLAT
+        inner *= answer.slips[:, None, None]
+        np.matmul(plane.transpose(0, 2, 1), inner @ plane, out=planes)
+        planes += shares[:, None, None] * _UNIT
 
     def corrections(self, fastest: float) -> Floats | None:
         """Velocities (rows, 3) that make good what has slipped in; None where nothing has.

@@ -128,7 +128,6 @@ class Newton:
         stack = self._stack(problem, 1 if corrections is None else 2)
         point, tangents = self._begin(problem, start)
         shift: Floats | None = None
-        origin = start.speeds
         miss = np.inf
         count = rounds = 0
         while True:
@@ -139,9 +138,6 @@ class Newton:
             end = self._at(problem, np.ascontiguousarray(solved[:, :, 0]))
             joints, pushes = _predicted(tangents, end)
             miss = _miss(end, joints, pushes)
-            if point is None and miss > _LOST:
-                # Begun in vain: no further than is better than where it came from.
-                point = self._at(problem, origin)
             if miss > self._tolerance and point is not None:
                 end = self._lowest(problem, point, end, joints, pushes)
             point = end
@@ -151,7 +147,7 @@ class Newton:
             # tangents stay the same: impulses change less than what they are asked for.
             if miss <= _NEARLY and rounds < _ROUNDS and self._follow(problem, end):
                 rounds += 1
-                point, origin = None, end.speeds
+                point = None
             elif miss <= self._tolerance:
                 break
             tangents = self._tangents(problem, end)
@@ -330,18 +326,24 @@ class Newton:
         at_low, at_high = slope(start, low), slope(end, high)
         if at_high <= _ENOUGH * abs(at_low) or at_low >= 0.0:
             return end
+        first, last = at_low, 0.0
         best = end
         for _ in range(_SEARCHES):
             # False position, kept away from the ends: the slope may jump.
             share = low + (high - low) * min(max(at_low / (at_low - at_high), 0.1), 0.9)
             best = self._between(problem, start, end, share)
             value = slope(best, share)
-            if abs(value) <= _ENOUGH * abs(at_low):
+            if abs(value) <= _ENOUGH * abs(first):
                 break
+            # Where one end stays twice, half of its slope counts (Dowell and Jarratt 1971): beside
+            # a joint that has stopped to flow it is hundreds of times the other's.
             if value > 0.0:
                 high, at_high = share, value
+                at_low *= 0.5 if last > 0.0 else 1.0
             else:
                 low, at_low = share, value
+                at_high *= 0.5 if last < 0.0 else 1.0
+            last = value
         return best
 
     def _between(self, problem: Problem, start: Iterate, end: Iterate, share: float) -> Iterate:
@@ -446,11 +448,9 @@ _FIRM = 1e9
 _UNIT = np.eye(3)
 _ENOUGH = 0.1
 """Of the slope at the start: where the lowest point is near enough."""
-_SEARCHES = 6
+_SEARCHES = 10
 _ROUNDS = 2
 """In which contacts learn from each other how fast they slip."""
-_LOST = 1.0
-"""Miss at which tangents of the step before were none of this one's."""
 _NEARLY = 0.1
 """Miss at which they can: to settle before would be to settle what is asked anew."""
 _NO_ROWS = np.zeros((0, 3))
