@@ -160,7 +160,8 @@ class Pattern:
         self.deepest = -2.0 * _WEIGHT * step * whole / self.contact_gains
         """(contacts,) least g/h that counts, m/s."""
         self.deepest_gaps = step * self.deepest
-        self.column = self.gains[:, None]
+        self.column = np.tile(self.gains[:, None], 3)
+        """(rows, 3) a, in three columns alike."""
         self.friction = friction
         self.slipping = friction / self.contact_gains
         self.spread = 1.0 / (1.0 + friction * friction)

@@ -141,24 +141,20 @@ class HoldBuilder:
         gain = _PIN_GAIN * mass
         self._pin_laws: tuple[_Law, _Law] = ((gain, 0.0, np.inf), (gain * size**2, 0.0, np.inf))
         self._step = step
-        self._key: list[tuple[int, bool, Coupling | None]] = []
+        self._held: list[tuple[Hold, bool]] = []
 
     def rows(self, bodies: Bodies, holds: Sequence[Hold]) -> Holds | None:
         """What holds the bodies where they are now; None where nothing does."""
         if not holds:
             return None
-        key = [
-            (each.body, each.turns, each.coupling if isinstance(each, HandSpring) else None)
-            for each in holds
-        ]
-        if key != self._key:
-            self._arrange(key)
-            self._key = key
-        # Points: where they are, where they are wanted, and how fast that moves.
-        locals_, targets, speeds = self._places
+        held_now = [(each, each.turns) for each in holds]
+        if held_now != self._held:
+            self._arrange(held_now)
+            self._held = held_now
+        # Points: where they are wanted, and how fast that moves.
+        targets, speeds = self._wanted
         row = 0
-        for hold, (_, turns, _) in zip(holds, key, strict=True):
-            locals_[row] = hold.point
+        for hold, turns in held_now:
             targets[row] = hold.target_position
             speeds[row] = hold.target_velocity[:3]
             row += 1
@@ -166,7 +162,7 @@ class HoldBuilder:
                 speeds[row] = hold.target_velocity[3:]
                 row += 1
         held = self._bodies
-        arms = (bodies.matrices.take(held, 0) @ locals_[:, :, None])[:, :, 0]
+        arms = (bodies.matrices.take(held, 0) @ self._points)[:, :, 0]
         points = bodies.positions.take(held, 0)
         points += arms
         ways = targets - points
@@ -177,7 +173,7 @@ class HoldBuilder:
             points,
             self._turns_held,
             self._gains,
-            self._stiffness * ways + self._gain_column * speeds,
+            self._stiffness * ways + self._gains3 * speeds,
             self._bounds,
             None if self._pinned is None else self._pinned * ways,
         )
@@ -196,32 +192,37 @@ class HoldBuilder:
         hands = (impulses / self._step).ravel()
         end = len(hands)
         # They come last.
-        for spring, (_, turns, _) in zip(reversed(springs), reversed(self._key), strict=False):
+        for spring, (_, turns) in zip(reversed(springs), reversed(self._held), strict=False):
             size = 6 if turns else 3
             end -= size
             wrench = np.zeros(6)
             wrench[:size] = hands[end : end + size]
             spring.wrench = wrench
 
-    def _arrange(self, holds: Sequence[tuple[int, bool, Coupling | None]]) -> None:
-        """What stays the same as long as the same bodies are held."""
+    def _arrange(self, holds: Sequence[tuple[Hold, bool]]) -> None:
+        """What stays the same as long as the same things hold in the same way."""
         # Body, whether a turn, gain, stiffness, bound, whether a pin.
         rows: list[tuple[int, bool, float, float, float, bool]] = []
-        for body, turns, coupling in holds:
-            laws = self._pin_laws if coupling is None else self._laws(coupling)
+        points: list[Floats] = []
+        for hold, turns in holds:
+            pin = not isinstance(hold, HandSpring)
+            laws = self._laws(hold.coupling) if isinstance(hold, HandSpring) else self._pin_laws
             for turn, law in zip((False, True) if turns else (False,), laws, strict=False):
-                rows.append((body, turn, *law, coupling is None))
-        held, turns, gains, stiff, bounds, pinned = zip(*rows, strict=True)
+                rows.append((hold.body, turn, *law, pin))
+                # Of a turn no point counts.
+                points.append(hold.point)
+        held, turned, gains, stiff, bounds, pinned = zip(*rows, strict=True)
         self._bodies = np.array(held)
-        self._turns_held = np.array(turns)
+        self._points = np.array(points)[:, :, None]
+        self._turns_held = np.array(turned)
         self._turning = np.flatnonzero(self._turns_held)
         self._gains = np.array(gains)
-        self._stiffness = np.array(stiff)[:, None]
         self._bounds = np.array(bounds)
-        self._gain_column = self._gains[:, None]
-        self._pinned = np.array(pinned, dtype=np.float64)[:, None] if any(pinned) else None
-        # Of a turn no point counts.
-        self._places = np.zeros((3, len(rows), 3))
+        # Three columns alike: numbers one by one take a third of the time of a column each.
+        self._gains3 = np.tile(self._gains[:, None], 3)
+        self._stiffness = np.tile(np.array(stiff)[:, None], 3)
+        self._pinned = np.tile(np.array(pinned, float)[:, None], 3) if any(pinned) else None
+        self._wanted = np.zeros((2, len(rows), 3))
 
     def _laws(self, coupling: Coupling) -> tuple[_Law, _Law]:
         """Of a hand's point and of its turn."""

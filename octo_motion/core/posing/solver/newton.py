@@ -173,7 +173,7 @@ class Newton:
             return point, self._tangents(problem, point)
         pressed, response, law = start.pressed, start.response, problem.law
         if pressed is None and problem.stops:
-            speeds = start.speeds.take(self._tree.joint_slot, 0)
+            speeds = self._tree.of_joints(start.speeds)
             pressed = _pushes(problem.stops[0], speeds) >= 0.0
         rows = None if start.rows is None else problem.rows.tangent(start.rows)
         if response is None:
@@ -192,7 +192,7 @@ class Newton:
         """All laws at u (slots, 3)."""
         tree = self._tree
         velocities = tree.velocities(speeds)
-        joint_speeds = speeds.take(tree.joint_slot, 0)
+        joint_speeds = tree.of_joints(speeds)
         response, impulses, pressed = self._joints(problem, joint_speeds)
         rows = problem.rows
         answer = rows.respond(rows.wanted(velocities)) if len(rows.bodies) else None

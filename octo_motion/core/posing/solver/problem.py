@@ -156,7 +156,7 @@ class ProblemBuilder:
             momenta *= self._kept
         stops = ()
         if len(self._stops.joints):
-            turning = speeds[self._tree.joint_slot]
+            turning = self._tree.of_joints(speeds)
             stops = self._stops.near(bodies.turns(), bodies.parent_matrices, turning, h)
         return Problem(
             h,

@@ -73,26 +73,23 @@ class Tree:
         count = len(self.parents)
         slots = len(layout.bodies)
         filled = layout.bodies >= 0
-        self.joint_slot = np.zeros(count, dtype=np.int64)
-        """(bodies,) slot of each body's joint."""
+        joint_slot = np.zeros(count, dtype=np.int64)
         joints = np.flatnonzero(filled & ~layout.shifts)
-        self.joint_slot[layout.bodies[joints]] = joints
+        joint_slot[layout.bodies[joints]] = joints
+        self.joint_slot = _slice_of(joint_slot)
+        """(bodies,) slot of each body's joint."""
         self.shift_slot = np.flatnonzero(layout.shifts)
         """(roots,) slot of each root's shift."""
         self.shift_slot = self.shift_slot[np.argsort(layout.bodies[self.shift_slot])]
-        self.carried_slots = np.concatenate([self.shift_slot, self.joint_slot[self.roots]])
+        self.carried_slots = np.concatenate([self.shift_slot, joint_slot[self.roots]])
         """(2 roots,) the roots' shifts, then their turns."""
         self.chain = np.where(filled, self.above[:, np.maximum(layout.bodies, 0)], 0.0)
         """(bodies, slots) 1 where the slot moves the body."""
         self.beyond = np.ascontiguousarray(self.chain.T)
-        self._joint_body = np.where(filled, layout.bodies, 0)
-        self._minus_joint = np.zeros((slots, 3))
-        self._minus_joint[joints] = -1.0
         # [1 | −p×] for a joint, [0 | 1] for a shift: Sᵀ, of which −p× changes.
         self.motion = np.zeros((slots, 3, 6))
         self.motion[joints, :, :3] = np.eye(3)
         self.motion[self.shift_slot, :, 3:] = np.eye(3)
-        self._fixed = self.motion[:, :, 3:].copy()
         self._prepare_blocks(filled)
 
     def _prepare_blocks(self, filled: Flags) -> None:
@@ -131,9 +128,12 @@ class Tree:
         if points is self._placed:
             return
         self._placed = points
-        at = points.take(self._joint_body, 0)
-        at *= self._minus_joint
-        np.add(skew(at), self._fixed, out=self.motion[:, :, 3:])
+        self.motion[self.joint_slot, :, 3:] = -skew(points)
+
+    def of_joints(self, speeds: Floats) -> Floats:
+        """(bodies, 3) of the joints, of u (slots, 3); perhaps the same numbers in memory."""
+        at = self.joint_slot
+        return speeds[at] if isinstance(at, slice) else speeds.take(at, 0)
 
     @property
     def cost(self) -> float:
@@ -221,6 +221,14 @@ class Tree:
         head = np.linalg.solve(self.trunk_matrix - folded[:, :cut], top - folded[:, cut:])
         tail = eliminated[..., cut:] - eliminated[..., :cut] @ head
         return np.concatenate([head, tail.reshape(-1, count)]).reshape(-1, 3, count)
+
+
+def _slice_of(places: Integers) -> Integers | slice:
+    """The same places; as a slice, where they follow each other: that is read and written faster."""
+    first = int(places[0])
+    if np.array_equal(places, np.arange(first, first + len(places))):
+        return slice(first, first + len(places))
+    return places
 
 
 def plan(parents: Integers, above: Floats) -> Layout:

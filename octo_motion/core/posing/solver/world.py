@@ -355,7 +355,7 @@ class World:
             springs = self._springs_after(problem, solution)
         if solution.moving is not None:
             speeds = solution.moving
-            turning = tree.from_roots(speeds.take(tree.joint_slot, 0))
+            turning = tree.from_roots(tree.of_joints(speeds))
         # A spring is at q_f then; its rest moves by what flowed.
         bodies.move(h * turning, h * speeds.take(tree.shift_slot, 0), springs, response.flows)
 
