@@ -86,7 +86,7 @@ class ElementResponse:
         law, size, trial = self.law, self.size, self.trial
         ratio = law.bending / (size * size * size)
         ratio *= self.flows
-        blocks = (law.gain * self.share)[:, None, None] * _UNIT
+        blocks = law.held * self.share[:, None, None]
         blocks -= (ratio[:, None] * trial)[:, :, None] * trial[:, None, :]
         return blocks
 
