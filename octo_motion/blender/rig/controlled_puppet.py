@@ -28,6 +28,7 @@ from .controls import (
     bone_values,
     control_names,
     hangs_on,
+    is_correction,
     reaches,
     set_bone_values,
 )
@@ -49,6 +50,10 @@ _FAR: Final = 0.02
 """Of the figure's size: a limb that is farther off is aimed anew."""
 _BENT: Final = 2e-3
 """Of the figure's size: a limb whose middle is nearer to its line is straight."""
+_LITTLE: Final = 3e-3
+"""Of the figure's size: what is farther off is not for controls that only correct."""
+_WORTH: Final = 0.5
+"""Of what is off: controls that leave more of it are not moved."""
 _AGAIN: Final = 15
 """Of how many poses that are written one looks for controls that are to move as well."""
 
@@ -114,9 +119,7 @@ class ControlledPuppet(Puppet):
     def settle(self) -> str:
         known = self._stood_before()
         if known is not None:
-            bones = self.armature().pose.bones  # type: ignore[union-attr]
-            for name, values in known.values.items():
-                set_bone_values(bones[name], values)
+            self._set(known.values)
             self._go_on(self._goal)
             return known.told
         goal = self._points.of(self._goal)
@@ -124,16 +127,18 @@ class ControlledPuppet(Puppet):
         wanted = set(turned)
         if wanted:
             self._aim(goal)
-        off = self._misses(goal)
-        # First what has been bent, then what does not go along by itself.
-        for close in (_CLOSE, _TOLD):
+        off, close = self._misses(goal), _CLOSE
+        # First what has been bent; then what does not go along by itself.
+        for find in (self._narrow, self._wide):
             if off.max() <= close:
                 break
-            self._take(self._wide(wanted), placed=True, anew=True)
+            controls, close = find(wanted), _TOLD
+            if not self._corrections(off):
+                off = self._tried(controls, goal, off, turned)
+            corrections = self._corrections(off)
+            if corrections:
+                off = self._tried(controls + corrections, goal, off, turned)
             wanted |= set(np.flatnonzero(off > _TOLD).tolist())
-            if self._fit is not None:
-                self._fit.settle(goal, self._points.hard, _CLOSE, _TOLD, self._own(turned))
-            off = self._misses(goal)
         told, body = "", int(np.argmax(off))
         if off[body] > _TOLD:
             told = phrase(
@@ -195,9 +200,17 @@ class ControlledPuppet(Puppet):
 
     def _keep(self, told: str) -> None:
         """Remember which values of the controls the pose is shown by."""
+        self._stood.append(_Stood(self._goal, self._values(), told))
+
+    def _values(self) -> dict[str, BoneValues]:
+        """Of all controls, as they are."""
         bones = self.armature().pose.bones  # type: ignore[union-attr]
-        values = {name: bone_values(bones[name]) for name in self._limbs}
-        self._stood.append(_Stood(self._goal, values, told))
+        return {name: bone_values(bones[name]) for name in self._limbs}
+
+    def _set(self, values: dict[str, BoneValues]) -> None:
+        bones = self.armature().pose.bones  # type: ignore[union-attr]
+        for name, each in values.items():
+            set_bone_values(bones[name], each)
 
     def _stood_before(self) -> _Stood | None:
         """How the pose was shown before, if it was: what is undone leaves no trace."""
@@ -301,7 +314,7 @@ class ControlledPuppet(Puppet):
         return [
             name
             for name, limbs in self._limbs.items()
-            if limbs & (moved if name in self._leading else wanted)
+            if limbs & (moved if name in self._leading else wanted) and not is_correction(name)
         ]
 
     def _narrow(self, wanted: set[int]) -> list[str]:
@@ -312,6 +325,30 @@ class ControlledPuppet(Puppet):
             for name in self._wide(wanted)
             if name in self._leading or self._limbs[name] <= moved
         ]
+
+    def _corrections(self, off: Floats) -> list[str]:
+        """Controls that correct limbs which are off (bodies,) by little, as where inverse
+        kinematics stretch bones; none for more, or for less than what is told.
+        """
+        if not _TOLD < off.max() <= _LITTLE:
+            return []
+        beside = set(np.flatnonzero(off > _CLOSE).tolist())
+        return [name for name in self._limbs if is_correction(name) and self._limbs[name] & beside]
+
+    def _tried(self, names: list[str], goal: Floats, off: Floats, turned: set[int]) -> Floats:
+        """(bodies,) how far limbs are off with these controls moved; where that leaves most of how
+        far they were off, controls stay as they are.
+        """
+        before = self._values()
+        self._take(names, placed=True, anew=True)
+        if self._fit is None:
+            return off
+        self._fit.settle(goal, self._points.hard, _CLOSE, _TOLD, self._own(turned))
+        found = self._misses(goal)
+        if found.max() <= max(_TOLD, _WORTH * off.max()):
+            return found
+        self._set(before)
+        return off
 
     def _take(self, names: list[str], *, placed: bool, anew: bool = False) -> None:
         """Let these controls be the ones that are moved; if they are already, they stay so."""
@@ -325,7 +362,10 @@ class ControlledPuppet(Puppet):
         self._moving = [
             Channels(
                 bones[name],
-                placed=name in self._leading or (placed and self._trunk in self._limbs[name]),
+                turned=not is_correction(name),
+                placed=is_correction(name)
+                or name in self._leading
+                or (placed and self._trunk in self._limbs[name]),
             )
             for name in names
         ]

@@ -19,8 +19,10 @@ from mathutils import Quaternion, Vector
 from ...core.rotations import Floats, angle_between, conjugate, multiply
 from .armature import armature_data, driven_channels, set_rotation
 
-_MECHANISM: Final = re.compile(r"(DEF|ORG|MCH|VIS)-|.*tweak", re.IGNORECASE)
-"""Names of bones that are no controls, or that only correct what others do."""
+_MECHANISM: Final = re.compile(r"(DEF|ORG|MCH|VIS)-", re.IGNORECASE)
+"""Names of bones that are no controls."""
+_CORRECTION: Final = re.compile(r".*tweak", re.IGNORECASE)
+"""Names of controls that only correct, by a little, what others do."""
 _READ_BONE: Final = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]')
 _FULL: Final = 1.0 - 1e-6
 _TRIED: Final = 0.1
@@ -159,6 +161,11 @@ def _closure(name: str, direct: Mapping[str, set[str]]) -> set[str]:
     return found
 
 
+def is_correction(name: str) -> bool:
+    """Whether a control only corrects what others do, by its name."""
+    return bool(_CORRECTION.match(name))
+
+
 def control_names(armature: bpy.types.Object, needed: Iterable[str]) -> list[str]:
     """Of bones that others hang on, those that an artist moves: shown, free, and no mechanism."""
     assert armature.pose is not None
@@ -200,7 +207,8 @@ def stiff_joints(armature: bpy.types.Object, joints: Mapping[str, str], size: fl
     """
     assert armature.pose is not None
     needs = hangs_on(armature)
-    names = control_names(armature, set().union(*(needs[each] for each in joints)))
+    needed = set().union(*(needs[each] for each in joints))
+    names = [each for each in control_names(armature, needed) if not is_correction(each)]
     bones = [armature.pose.bones[each] for each in names]
     values = [bone_values(each) for each in bones]
     channels = [Channels(each) for each in bones]
@@ -246,7 +254,9 @@ def _bends(armature: bpy.types.Object, joints: Mapping[str, str]) -> Floats:
 class Channels:
     """What of a bone's pose can be moved, from how it stands: first it turns, then it goes."""
 
-    def __init__(self, bone: bpy.types.PoseBone, *, placed: bool = True) -> None:
+    def __init__(
+        self, bone: bpy.types.PoseBone, *, turned: bool = True, placed: bool = True
+    ) -> None:
         self.name = bone.name
         self._place = Vector(bone.location[:])
         self._turn = _turn(bone)
@@ -255,7 +265,7 @@ class Channels:
             held = held | bone.lock_rotation_w
         self._angles = np.array(bone.rotation_euler, dtype=np.float64)
         self._euler = bone.rotation_mode not in {"QUATERNION", "AXIS_ANGLE"} and bool(held.any())
-        self._turns = np.flatnonzero(~held)
+        self._turns = np.flatnonzero(~held & turned)
         free = np.zeros(0, dtype=np.int64)
         if placed and not (bone.bone.use_connect and bone.parent is not None):
             free = np.flatnonzero(~np.array(bone.lock_location))
