@@ -7,7 +7,7 @@ limbs stand as the puppet does.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -27,6 +27,7 @@ from .controls import (
     Reach,
     bone_values,
     control_names,
+    correction_names,
     hangs_on,
     is_correction,
     reaches,
@@ -67,6 +68,12 @@ class _Stood:
     told: str
     """What of it they could not show."""
 
+    def shows(self, pose: Pose) -> bool:
+        """Whether it is this pose."""
+        apart = np.abs(self.pose.positions - pose.positions).max()
+        turned = angle_between(self.pose.orientations, pose.orientations).max()
+        return bool(max(apart, turned) < _SAME_POSE)
+
 
 class ControlledPuppet(Puppet):
     """A puppet that is posed through controls."""
@@ -75,7 +82,8 @@ class ControlledPuppet(Puppet):
         super().__init__(armature, rig)
         names = rig.figure.names
         bent = bent_bones(armature)
-        found = control_names(armature, set().union(*rig.needs.values()))
+        needed = set().union(*rig.needs.values())
+        found = control_names(armature, needed) + correction_names(armature, needed)
         self._limbs = {
             control: frozenset(
                 body for body, name in enumerate(names) if control in rig.needs[name]
@@ -133,19 +141,11 @@ class ControlledPuppet(Puppet):
             if off.max() <= close:
                 break
             controls, close = find(wanted), _TOLD
-            if not self._corrections(off):
-                off = self._tried(controls, goal, off, turned)
-            corrections = self._corrections(off)
-            if corrections:
+            off = self._tried(controls, goal, off, turned)
+            if corrections := _corrections(self._limbs, off):
                 off = self._tried(controls + corrections, goal, off, turned)
             wanted |= set(np.flatnonzero(off > _TOLD).tolist())
-        told, body = "", int(np.argmax(off))
-        if off[body] > _TOLD:
-            told = phrase(
-                "{name} is {far:.3g} off: its controls do not reach",
-                name=self.figure.names[body],
-                far=float(off[body]) * self._size,
-            )
+        told = "" if off.max() <= _TOLD else _told(self.figure.names, off * self._size)
         self._keep(told)
         self._go_on(self._goal)
         return told
@@ -181,7 +181,8 @@ class ControlledPuppet(Puppet):
             origin = self._origins[name]
             turned, placed = origin.is_moved(armature.pose.bones[name])
             # Controls give the pose together: what has moved is keyed whichever limb was asked for.
-            if (wanted and (turned or placed)) or (all_bones and limbs & wanted):
+            asked = all_bones and limbs & wanted and not is_correction(name)
+            if (wanted and (turned or placed)) or asked:
                 found.append((name, placed or (all_bones and origin.goes)))
         return found
 
@@ -203,7 +204,6 @@ class ControlledPuppet(Puppet):
         self._stood.append(_Stood(self._goal, self._values(), told))
 
     def _values(self) -> dict[str, BoneValues]:
-        """Of all controls, as they are."""
         bones = self.armature().pose.bones  # type: ignore[union-attr]
         return {name: bone_values(bones[name]) for name in self._limbs}
 
@@ -214,12 +214,7 @@ class ControlledPuppet(Puppet):
 
     def _stood_before(self) -> _Stood | None:
         """How the pose was shown before, if it was: what is undone leaves no trace."""
-        for each in reversed(self._stood):
-            apart = np.abs(each.pose.positions - self._goal.positions).max()
-            turned = angle_between(each.pose.orientations, self._goal.orientations).max()
-            if max(apart, turned) < _SAME_POSE:
-                return each
-        return None
+        return next((each for each in reversed(self._stood) if each.shows(self._goal)), None)
 
     def _aim(self, goal: Floats) -> None:
         """Bring goals and poles of inverse kinematics to where the limbs want them, about.
@@ -288,29 +283,21 @@ class ControlledPuppet(Puppet):
         """Bodies that are turned against what they hang on since the bones were read."""
         return set(turned_bodies(self.figure, self._base, self._goal))
 
-    def _own(self, turned: set[int]) -> list[int]:
-        """Which of the controls that are moved begin at limbs that were bent."""
-        return [
-            number
-            for number, each in enumerate(self._moving)
-            if min(self._limbs[each.name], default=-1) in turned
-        ]
-
     def _misses(self, goal: Floats) -> Floats:
         """(bodies,) how far each limb is from where it is wanted, in sizes of the figure."""
         now = self._points.shown(self.armature())
         apart = np.linalg.norm(self._points.limbs_of(now - goal), axis=2)
         return apart.max(axis=0)
 
-    def _way(self) -> Floats:
-        """(bodies,) how far each limb is to go, in sizes of the figure."""
+    def _moved(self) -> set[int]:
+        """Bodies that are to go somewhere else."""
         before, after = self._points.of(self._base), self._points.of(self._goal)
-        way = self._points.limbs_of(after - before)
-        return np.linalg.norm(way, axis=2).max(axis=0)
+        way = np.linalg.norm(self._points.limbs_of(after - before), axis=2).max(axis=0)
+        return set(np.flatnonzero(way > _MOVED).tolist())
 
     def _wide(self, wanted: set[int]) -> list[str]:
         """Controls on which these bodies hang, and those that lead others that have been moved."""
-        moved = set(np.flatnonzero(self._way() > _MOVED).tolist()) | wanted
+        moved = self._moved() | wanted
         return [
             name
             for name, limbs in self._limbs.items()
@@ -319,21 +306,12 @@ class ControlledPuppet(Puppet):
 
     def _narrow(self, wanted: set[int]) -> list[str]:
         """Controls of bodies on which nothing hangs that is to stay where it is."""
-        moved = set(np.flatnonzero(self._way() > _MOVED).tolist()) | wanted
+        moved = self._moved() | wanted
         return [
             name
             for name in self._wide(wanted)
             if name in self._leading or self._limbs[name] <= moved
         ]
-
-    def _corrections(self, off: Floats) -> list[str]:
-        """Controls that correct limbs which are off (bodies,) by little, as where inverse
-        kinematics stretch bones; none for more, or for less than what is told.
-        """
-        if not _TOLD < off.max() <= _LITTLE:
-            return []
-        beside = set(np.flatnonzero(off > _CLOSE).tolist())
-        return [name for name in self._limbs if is_correction(name) and self._limbs[name] & beside]
 
     def _tried(self, names: list[str], goal: Floats, off: Floats, turned: set[int]) -> Floats:
         """(bodies,) how far limbs are off with these controls moved; where that leaves most of how
@@ -343,7 +321,8 @@ class ControlledPuppet(Puppet):
         self._take(names, placed=True, anew=True)
         if self._fit is None:
             return off
-        self._fit.settle(goal, self._points.hard, _CLOSE, _TOLD, self._own(turned))
+        own = _beginning_at(turned, [self._limbs[each.name] for each in self._moving])
+        self._fit.settle(goal, self._points.hard, _CLOSE, _TOLD, own)
         found = self._misses(goal)
         if found.max() <= max(_TOLD, _WORTH * off.max()):
             return found
@@ -396,6 +375,32 @@ class ControlledPuppet(Puppet):
             each.write(bone, values[start : start + each.count], own_size)
             start += each.count
         return self._points.shown(armature)
+
+
+def _beginning_at(bodies: set[int], limbs: Sequence[frozenset[int]]) -> list[int]:
+    """Numbers of the controls, by the bodies on each, that begin at one of some bodies."""
+    return [number for number, each in enumerate(limbs) if min(each, default=-1) in bodies]
+
+
+def _told(names: Sequence[str], off: Floats) -> str:
+    """Which limb is farthest off, of (bodies,) metres."""
+    body = int(np.argmax(off))
+    return phrase(
+        "{name} is {far:.3g} off: its controls do not reach",
+        name=names[body],
+        far=float(off[body]),
+    )
+
+
+def _corrections(limbs: Mapping[str, frozenset[int]], off: Floats) -> list[str]:
+    """Of controls with the bodies that hang on them, those that correct limbs which are off
+    (bodies,) by little, as where inverse kinematics stretch bones; none for more, or for less than
+    what is told.
+    """
+    if not _TOLD < off.max() <= _LITTLE:
+        return []
+    beside = set(np.flatnonzero(off > _CLOSE).tolist())
+    return [name for name, bodies in limbs.items() if is_correction(name) and bodies & beside]
 
 
 def _swivelled(place: Floats, before: Floats, after: Floats, size: float) -> Floats:

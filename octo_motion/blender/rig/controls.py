@@ -168,6 +168,15 @@ def is_correction(name: str) -> bool:
 
 def control_names(armature: bpy.types.Object, needed: Iterable[str]) -> list[str]:
     """Of bones that others hang on, those that an artist moves: shown, free, and no mechanism."""
+    return [each for each in _moved_by_hand(armature, needed) if not is_correction(each)]
+
+
+def correction_names(armature: bpy.types.Object, needed: Iterable[str]) -> list[str]:
+    """The same, of those that only correct what these do."""
+    return [each for each in _moved_by_hand(armature, needed) if is_correction(each)]
+
+
+def _moved_by_hand(armature: bpy.types.Object, needed: Iterable[str]) -> list[str]:
     assert armature.pose is not None
     names = set(needed)
     driven = {
@@ -207,8 +216,7 @@ def stiff_joints(armature: bpy.types.Object, joints: Mapping[str, str], size: fl
     """
     assert armature.pose is not None
     needs = hangs_on(armature)
-    needed = set().union(*(needs[each] for each in joints))
-    names = [each for each in control_names(armature, needed) if not is_correction(each)]
+    names = control_names(armature, set().union(*(needs[each] for each in joints)))
     bones = [armature.pose.bones[each] for each in names]
     values = [bone_values(each) for each in bones]
     channels = [Channels(each) for each in bones]

@@ -30,7 +30,7 @@ _LEAST_DAMPING: Final = 1e-8
 _MOST_DAMPING: Final = 1e2
 _SLOW: Final = 0.5
 """Share of the miss: a step that leaves more of it asks for new derivatives."""
-_ENOUGH: Final = 0.95
+_ENOUGH: Final = 0.9
 """Share of the miss: with new derivatives, what leaves more of it is not worth its while."""
 _SAME: Final = 1e-4
 """Of the largest, what counts as no derivative: as near as differences tell."""

@@ -224,7 +224,7 @@ class Tree:
 
 
 def _slice_of(places: Integers) -> Integers | slice:
-    """The same places; as a slice, where they follow each other: that is read and written faster."""
+    """The same places; a slice, which is read and written faster, if they follow each other."""
     first = int(places[0])
     if np.array_equal(places, np.arange(first, first + len(places))):
         return slice(first, first + len(places))
