@@ -289,7 +289,7 @@ class ControlledPuppet(Puppet):
         apart = np.linalg.norm(self._points.limbs_of(now - goal), axis=2)
         return apart.max(axis=0)
 
-    def _moved(self) -> set[int]:
+    def _going(self) -> set[int]:
         """Bodies that are to go somewhere else."""
         before, after = self._points.of(self._base), self._points.of(self._goal)
         way = np.linalg.norm(self._points.limbs_of(after - before), axis=2).max(axis=0)
@@ -297,7 +297,7 @@ class ControlledPuppet(Puppet):
 
     def _wide(self, wanted: set[int]) -> list[str]:
         """Controls on which these bodies hang, and those that lead others that have been moved."""
-        moved = self._moved() | wanted
+        moved = self._going() | wanted
         return [
             name
             for name, limbs in self._limbs.items()
@@ -306,7 +306,7 @@ class ControlledPuppet(Puppet):
 
     def _narrow(self, wanted: set[int]) -> list[str]:
         """Controls of bodies on which nothing hangs that is to stay where it is."""
-        moved = self._moved() | wanted
+        moved = self._going() | wanted
         return [
             name
             for name in self._wide(wanted)

@@ -131,6 +131,8 @@ _PIN_GAIN = 1e5
 
 _Law = tuple[float, float, float]
 """Gain, stiffness and bound of a row."""
+_Held = tuple[Hold, bool, Coupling | None]
+"""What holds, whether it holds a turn as well, and a hand's coupling."""
 
 
 class HoldBuilder:
@@ -141,20 +143,23 @@ class HoldBuilder:
         gain = _PIN_GAIN * mass
         self._pin_laws: tuple[_Law, _Law] = ((gain, 0.0, np.inf), (gain * size**2, 0.0, np.inf))
         self._step = step
-        self._held: list[tuple[Hold, bool]] = []
+        self._held: list[_Held] = []
 
     def rows(self, bodies: Bodies, holds: Sequence[Hold]) -> Holds | None:
         """What holds the bodies where they are now; None where nothing does."""
         if not holds:
             return None
-        held_now = [(each, each.turns) for each in holds]
+        held_now = [
+            (each, each.turns, each.coupling if isinstance(each, HandSpring) else None)
+            for each in holds
+        ]
         if held_now != self._held:
             self._arrange(held_now)
             self._held = held_now
         # Points: where they are wanted, and how fast that moves.
         targets, speeds = self._wanted
         row = 0
-        for hold, turns in held_now:
+        for hold, turns, _ in held_now:
             targets[row] = hold.target_position
             speeds[row] = hold.target_velocity[:3]
             row += 1
@@ -192,21 +197,21 @@ class HoldBuilder:
         hands = (impulses / self._step).ravel()
         end = len(hands)
         # They come last.
-        for spring, (_, turns) in zip(reversed(springs), reversed(self._held), strict=False):
+        for spring, (_, turns, _) in zip(reversed(springs), reversed(self._held), strict=False):
             size = 6 if turns else 3
             end -= size
             wrench = np.zeros(6)
             wrench[:size] = hands[end : end + size]
             spring.wrench = wrench
 
-    def _arrange(self, holds: Sequence[tuple[Hold, bool]]) -> None:
+    def _arrange(self, holds: Sequence[_Held]) -> None:
         """What stays the same as long as the same things hold in the same way."""
         # Body, whether a turn, gain, stiffness, bound, whether a pin.
         rows: list[tuple[int, bool, float, float, float, bool]] = []
         points: list[Floats] = []
-        for hold, turns in holds:
-            pin = not isinstance(hold, HandSpring)
-            laws = self._laws(hold.coupling) if isinstance(hold, HandSpring) else self._pin_laws
+        for hold, turns, coupling in holds:
+            pin = coupling is None
+            laws = self._pin_laws if coupling is None else self._laws(coupling)
             for turn, law in zip((False, True) if turns else (False,), laws, strict=False):
                 rows.append((hold.body, turn, *law, pin))
                 # Of a turn no point counts.
