@@ -27,6 +27,7 @@ from ...core.keyframes import (
     RigChannels,
     rotation_property,
 )
+from ...core.memory import ROOM, keep_memory
 from ...core.phrases import phrase
 from ...core.rotations import IDENTITY, Floats, from_matrix, from_mode_values
 from ...core.steps import finished
@@ -57,6 +58,8 @@ CHANNELS_AT_ONCE: Final = 6
 or so."""
 _CURVES_AT_ONCE: Final = 50
 """How many are read at one step to see whether they have been edited."""
+_KEY_BYTES: Final = 88
+"""Of a key in Blender's memory, about."""
 _LEAST_SPACING: Final = 0.01
 """Blender takes keys that are no further apart, in frames, for one and the same."""
 
@@ -553,7 +556,11 @@ class _Written:
         curves = {(curve.data_path, curve.array_index): curve for curve in channelbag.fcurves}
         # Everything goes through the same few buffers: memory stays modest, however many the bones.
         points, kinds = _dense_keys(times, automatic=automatic)
-        for channel in channels:
+        often = max(1, ROOM // (_KEY_BYTES * 4 * len(times)))
+        for number, channel in enumerate(channels):
+            if number % often == 0:
+                keep_memory()
+            own = None
             for component in range(channel.values.shape[1]):
                 place = (channel.data_path, component)
                 curve = curves.pop(place, None)
@@ -569,7 +576,9 @@ class _Written:
                     and (_has_own_handles(curve) if there is None else there.had_own_handles)
                     != (channel.keys is not None)
                 ):
-                    curve.group = group_named(channelbag, channel.group)
+                    # Looked for once: that takes the longer, the more there are.
+                    own = own or group_named(channelbag, channel.group)
+                    curve.group = own
                 if there is None:
                     if channel.keys is not None:
                         there = _fill_bezier(curve, channel.keys, component)
@@ -585,6 +594,8 @@ class _Written:
         for curve in curves.values():
             # Its group goes with the last of its curves.
             channelbag.fcurves.remove(curve)
+        # Blender's evaluation gets a copy of them all.
+        keep_memory()
 
 
 def _dense_keys(times: np.ndarray, *, automatic: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -787,6 +798,10 @@ def _fill_bezier(curve: bpy.types.FCurve, keys: BezierKeys, component: int) -> _
 
 def _tell(curve: bpy.types.FCurve, filled: _Filled, channel: Channel) -> _Filled:
     """Let Blender look at a curve's keys anew, and put its handles right."""
+    if channel.keys is None:
+        # They are in order, and none at one and the same frame: all that is left are handles.
+        curve.keyframe_points.handles_recalc()
+        return replace(filled, told=True)
     curve.update()
     handles = _handles(curve) if channel.keys is not None else None
     return _Filled(filled.count, filled.digest, handles, filled.had_own_handles)

@@ -23,7 +23,7 @@ from typing import Final
 
 import numpy as np
 
-from ...rotations import Floats, components_first, from_axis_angle, multiply, rotate
+from ...rotations import Floats, components_first
 from ...rotations.components_first import cumulative_sum
 from ..rig import lift_to_floor
 
@@ -102,10 +102,6 @@ def group_lengths(lengths: Floats, sizes: tuple[int, int, int]) -> Floats:
 
 HEAD, PITCH, BANK = range(3)
 
-_OUTWARD = np.array([1.0, 0.0, 0.0])
-_ACROSS = np.array([0.0, 1.0, 0.0])
-_UP = np.array([0.0, 0.0, 1.0])
-
 # A link shrinks by |F|/2π, so that a table with turns of 360° would leave nothing of it.
 SHORTEST = 0.05
 
@@ -130,14 +126,24 @@ def link_rotations(angles: Floats) -> Floats:
     turned. Bank does not turn the chain: the source moves targets by head and pitch alone. Angles
     (…, links, 3) are head, pitch, bank in radians; positive pitch turns x towards y.
     """
-    own = multiply(
-        from_axis_angle(_UP, angles[..., PITCH]), from_axis_angle(-_ACROSS, angles[..., HEAD])
+    # Cosines and sines by the tangent of half of the angle, which is quicker; components first.
+    half = np.moveaxis(np.tan(0.25 * angles[..., [HEAD, PITCH]]), (-1, -2), (0, 1))
+    sine = 2.0 / (1.0 + half * half)
+    cosine = sine - 1.0
+    sine *= half
+    own = np.stack(
+        [
+            cosine[PITCH] * cosine[HEAD],
+            sine[PITCH] * sine[HEAD],
+            -cosine[PITCH] * sine[HEAD],
+            sine[PITCH] * cosine[HEAD],
+        ],
+        axis=1,
     )
-    result = np.empty_like(own)
-    result[..., 0, :] = own[..., 0, :]
-    for link in range(1, own.shape[-2]):
-        result[..., link, :] = multiply(result[..., link - 1, :], own[..., link, :])
-    return result
+    each = own.reshape(*own.shape[:2], -1)
+    for link in range(1, len(each)):
+        each[link] = components_first.multiply(each[link - 1], each[link])
+    return np.moveaxis(own, (0, 1), (-2, -1))
 
 
 def pseudo_targets(rotations: Floats, widths: Floats) -> Floats:
@@ -146,9 +152,17 @@ def pseudo_targets(rotations: Floats, widths: Floats) -> Floats:
     Widths (…, links) are ``H_g (1 + e_g)`` of each link [Octopus, eq. 3.12–3.14, which reuse the
     name H for the change of the width].
     """
-    steps = rotate(rotations, _OUTWARD * widths[..., None])
-    zero = np.zeros_like(steps[..., :1, :])
-    return np.concatenate([zero, np.cumsum(steps, axis=-2)], axis=-2)
+    w, x, y, z = np.moveaxis(rotations, -1, 0)
+    doubled = 2.0 * widths
+    result = np.empty((rotations.shape[-2] + 1, 3, *rotations.shape[:-2]))
+    places = np.moveaxis(result, (0, 1), (-2, -1))
+    places[..., 0, :] = 0.0
+    # What turns of x along the links.
+    places[..., 1:, 0] = widths - doubled * (y * y + z * z)
+    places[..., 1:, 1] = doubled * (x * y + w * z)
+    places[..., 1:, 2] = doubled * (x * z - w * y)
+    cumulative_sum(result)
+    return places
 
 
 SWEEPS: Final = 4
@@ -179,6 +193,8 @@ _SLIGHT: Final = np.radians(8.0)
 _MOST_FOLDED: Final = np.tan(np.radians(85.0)) ** 2
 _NEWTON_STEPS: Final = 6
 _NEWTON_STEPS_BETWEEN: Final = 2
+# A step that changes less than this, as a share, is the last: the next one would be its square.
+_NEAR: Final = 1e-7
 # Arm lengths within which a joint comes to rest on a floor.
 FLOOR_ROUNDING: Final = 0.1
 _SHORT: Final = 1e-9
@@ -369,8 +385,7 @@ def swept(directions: Floats, lengths: Floats, weights: Floats, goal: Floats) ->
 
     At each joint everything beyond it turns about ``(P_e − P_j) × (Q − P_j)`` by ``a_j ξ_j``.
     The joints nearer to the root have not moved yet when a joint turns, and those beyond move as
-    one piece; so it is enough to carry along the vector from the joint to the end, and to apply
-    to each segment all turns from the root up to its own joint.
+    one piece.
 
     Weights count for groups of four joints, as in the source; where more joints share the bend,
     each takes the less of it.
@@ -379,24 +394,12 @@ def swept(directions: Floats, lengths: Floats, weights: Floats, goal: Floats) ->
     steps = lengths[:, None, None] * directions
     whole = float(np.sum(lengths))
     scale = min(1.0, _JOINTS_OF_A_WEIGHT / count)
-    to_goal = goal - chord(directions, lengths)
-    turns: list[tuple[Floats, Floats]] = []
-    end = np.zeros_like(goal)
+    to_goal = goal - steps.sum(axis=0)
+    result, end = directions.copy(), np.zeros_like(goal)
     for joint in range(count - 1, -1, -1):
         end += steps[joint]
         to_goal += steps[joint]
-        turns.append(_partial_turn(end, to_goal, weights[joint] * scale, whole))
-    result = np.empty_like(directions)
-    # A turn is 1 + p ⊗ q, p and q two vectors each in the plane that it turns.
-    planes, change = turns.pop()
-    carried = np.einsum("xib,xjb->ijb", planes, change)
-    for axis in range(3):
-        carried[axis, axis] += 1.0
-    result[0] = np.einsum("ijb,jb->ib", carried, directions[0])
-    for joint in range(1, count):
-        planes, change = turns.pop()
-        carried += np.einsum("xib,xjb->ijb", np.einsum("ijb,xjb->xib", carried, planes), change)
-        result[joint] = np.einsum("ijb,jb->ib", carried, directions[joint])
+        _turn_partly(end, to_goal, weights[joint] * scale, whole, result[joint:])
     return result
 
 
@@ -487,13 +490,13 @@ def _scaled(directions: Floats, lengths: Floats, wanted: Floats, steps: int) -> 
     count, _, batch = directions.shape
     whole = float(np.sum(lengths))
     axis = chord(directions, lengths)
-    found = _size(axis)
-    axis /= np.maximum(found, _TINY)
+    reach = _size(axis)
+    axis /= np.maximum(reach, _TINY)
     along = np.einsum("scb,cb->sb", directions, axis)
     rest = np.maximum(1.0 + along, 1e-9)
     tangent = np.maximum(1.0 - along, 0.0) / rest
     limit = _MOST_FOLDED / np.maximum(np.max(tangent, axis=0), _TINY)
-    square = _squared_arc(wanted / whole) / np.maximum(_squared_arc(found / whole), _TINY)
+    square = _squared_arc(wanted / whole) / np.maximum(_squared_arc(reach / whole), _TINY)
     square = np.minimum(square, limit)
     # Of each segment what is across the axis, and half of what makes its length along it.
     parts = np.empty((count, 4, batch))
@@ -505,6 +508,8 @@ def _scaled(directions: Floats, lengths: Floats, wanted: Floats, steps: int) -> 
     weighted = lengths[:, None] * factor
     shares = np.empty((2, count, batch))
     goal = wanted * wanted
+    # Each one stops on its own account: it hangs on no other.
+    found = np.zeros(batch, dtype=bool)
     for _ in range(steps):
         share = square * tangent
         share += 1.0
@@ -523,7 +528,12 @@ def _scaled(directions: Floats, lengths: Floats, wanted: Floats, steps: int) -> 
         step = square - excess / np.minimum(slope, -_TINY)
         np.minimum(step, 4.0 * square, out=step)
         np.maximum(step, 0.25 * square, out=step)
-        square = np.minimum(step, limit, out=step)
+        np.minimum(step, limit, out=step)
+        np.copyto(step, square, where=found)
+        found |= np.abs(step - square) <= _NEAR * square
+        square = step
+        if found.all():
+            break
     share = 1.0 / (1.0 + square * tangent)
     result = across * (factor * np.sqrt(square) * share)[:, None]
     result += (2.0 * share - 1.0)[:, None] * axis
@@ -536,39 +546,63 @@ def _squared_arc(ratio: Floats) -> Floats:
     return missing * (6.0 + (np.pi**2 - 6.0) * missing)
 
 
-def _partial_turn(
-    end: Floats, to_goal: Floats, share: float, whole: float
-) -> tuple[Floats, Floats]:
-    """A share of the smallest turn from one vector (3, batch) to another; the first is turned.
+def _turn_partly(end: Floats, to_goal: Floats, share: float, whole: float, beyond: Floats) -> None:
+    """Turn a vector (3, batch) and directions (segments, 3, batch), all of them in place, by a
+    share of the smallest turn from that vector to another.
 
     Where the turn has no definite axis it fades out: near half a turn, and where the vectors are
-    short against the ``whole`` group. Two unit vectors (2, 3, batch) span the plane which is
-    turned, and the two whose products with these make the turn, less one.
+    short against the ``whole`` group.
     """
+    # Two vectors span the plane which is turned: the one itself, and of the other what is across.
     plane = np.empty((2, *end.shape))
-    size = _size(end)
-    np.divide(end, np.maximum(size, _TINY), out=plane[0])
-    cosine = np.einsum("cb,cb->b", plane[0], to_goal)
-    np.multiply(plane[0], cosine, out=plane[1])
+    plane[0] = end
+    squared = np.einsum("cb,cb->b", end, end)
+    size = np.sqrt(squared)
+    one = 1.0 / np.maximum(size, _TINY)
+    cosine = np.einsum("cb,cb->b", end, to_goal)
+    cosine *= one
+    np.multiply(end, cosine * one, out=plane[1])
     np.subtract(to_goal, plane[1], out=plane[1])
     square = np.einsum("cb,cb->b", plane[1], plane[1])
     sine = np.sqrt(square)
-    plane[1] /= np.maximum(sine, _TINY)
     angle = np.arctan2(sine, cosine)
-    lever = size * np.sqrt(square + cosine * cosine)
-    half = np.minimum(4.0 - angle * (4.0 / np.pi), 1.0)
+    cosine *= cosine
+    cosine += square
+    lever = np.sqrt(cosine, out=cosine)
+    lever *= size
+    half = angle * (-4.0 / np.pi)
+    half += 4.0
+    np.minimum(half, 1.0, out=half)
     half *= angle
-    half *= (0.5 * share) * lever / (lever + _SHORT_LEVER * whole * whole)
+    half *= lever
+    lever += _SHORT_LEVER * whole * whole
+    lever *= 2.0 / share
+    half /= lever
     # By the tangent of half of it, which is quicker than its sine.
-    tangent = np.tan(half)
-    turn = 2.0 * tangent / (1.0 + tangent * tangent)
-    lost = turn * tangent
-    np.multiply(plane[0], size * (1.0 - lost), out=end)
-    end += (size * turn) * plane[1]
-    change = plane * -lost
-    change[0] -= turn * plane[1]
-    change[1] += turn * plane[0]
-    return plane, change
+    tangent = np.tan(half, out=half)
+    turn = tangent * tangent
+    turn += 1.0
+    np.divide(tangent, turn, out=turn)
+    turn *= 2.0
+    lost = tangent
+    lost *= turn
+    # What these vectors lack to be of unit length counts for how much of them there is to be.
+    other = 1.0 / np.maximum(sine, _TINY)
+    parts = np.einsum("xcb,scb->sxb", plane, beyond)
+    parts[:, 0] *= one
+    parts[:, 1] *= other
+    added = parts * -lost
+    parts *= turn
+    added[:, 0] -= parts[:, 1]
+    added[:, 1] += parts[:, 0]
+    added[:, 0] *= one
+    added[:, 1] *= other
+    beyond += np.einsum("sxb,xcb->scb", added, plane)
+    # The vector itself has nothing across.
+    turn *= other
+    turn *= size
+    end -= lost * plane[0]
+    end += turn * plane[1]
 
 
 def _size(vectors: Floats) -> Floats:

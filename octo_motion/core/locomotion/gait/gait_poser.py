@@ -108,7 +108,7 @@ def bone_twists(build: Build, angles: Floats) -> Floats:
 
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _SIDEWAYS: Final = np.array([1.0, 0.0, 0.0])
-_CHUNK: Final = 4096
+_CHUNK: Final = 8192
 """Arms solved at a time, counted over frames: what stays within a processor's cache."""
 _FEW: Final = 100
 """Shapes that are kept: of a few arms at a few frames, which cost as much to start as many."""

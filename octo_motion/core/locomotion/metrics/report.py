@@ -203,6 +203,8 @@ class Measured:
     that is rolled out, or that moves; none where the plan is the world."""
     ground_moves: bool = False
     """Whether that ground moves: what holds is measured in the plan then."""
+    turning: Floats | None = None
+    """What :func:`turns_in_world` says of the poses, none where nobody has asked it."""
 
     @property
     def as_it_plays(self) -> Measured:
@@ -210,7 +212,7 @@ class Measured:
         if self.rolled_up is None:
             return self
         poses, halfway = self.rolled_up
-        return replace(self, poses=poses, halfway=halfway, rolled_up=None)
+        return replace(self, poses=poses, halfway=halfway, rolled_up=None, turning=None)
 
     @property
     def moments(self) -> Floats:
@@ -358,6 +360,8 @@ def _turning(measured: Measured) -> Floats:
     if measured.played is not None:
         turned = np.concatenate([each[::2] for each in measured.played.orientations], axis=1)
         return angle_between(turned[:-1], turned[1:])
+    if measured.turning is not None:
+        return measured.turning
     poses = measured.poses
     _, orientations = measured.stays or (poses.locations, poses.orientations)
     return turns_in_world(measured.arms, poses.rotations, orientations)

@@ -14,6 +14,7 @@ from typing import Final, TypeVar
 import numpy as np
 
 from ...keyframes import Channel
+from ...memory import keep_memory
 from ...phrases import phrase
 from ...rotations import IDENTITY, Floats, conjugate, from_matrix, multiply, rotate, slerp
 from ..body import BodyMoments, OrganPoses, pose_organs
@@ -39,6 +40,7 @@ from ..rig import (
     halfway_automatic,
     object_transforms,
     root_bone_transforms,
+    turns_in_world,
     where_it_helps,
 )
 from .carrying import Carry, carried
@@ -72,6 +74,8 @@ class MotionResult:
     """Whether keys without handles of their own have automatic ones."""
     arms: ArmMotion
     """The arms at all moments at which they were worked out: frames, or those and half frames."""
+    phase: Floats
+    """(frames,) radians of the gait, unwrapped."""
     carried: tuple[Carried, ...] = ()
     """Where arms that reach take objects."""
     measured: Measured | None = None
@@ -112,14 +116,12 @@ _EXACT_ANGLE: Final = np.radians(0.5)
 """Radians that keys on every frame may be off there …"""
 _EXACT_DISTANCE: Final = 0.002
 """… and arm lengths of an arm's tip."""
-_BONES_AT_ONCE: Final = 24_000
-"""Bones times frames of one step of the work: some tens of megabytes."""
-_KEPT: Final = 2**25 - 2**16
-"""Bytes of the largest arrays whose memory is kept: glibc keeps that of none beyond 2**25."""
+_BONES_AT_ONCE: Final = 96_000
+"""Bones times frames of one step of the work: some tens of megabytes …"""
+_BONES_IN_BRIEF: Final = 6_000
+"""… and where Blender goes on meanwhile; the numbers are the same."""
 _EASINGS: Final = 4
 """How often bones that turn too fast are given more time, and kept off the ground again."""
-_TURNS: Final = 4
-"""Of one step where Blender goes on meanwhile; the numbers are the same."""
 _FLOOR_AROUND: Final = 2.5
 """Arm lengths to all sides of the body in which the floor is looked at …"""
 _FLOOR_FINE: Final = 0.02
@@ -159,17 +161,6 @@ def compute(job: MotionJob, *, brief: bool = False) -> Steps[MotionResult]:
     return (yield from scaled(pose(plan, brief=brief), _PLANNING, 1.0))
 
 
-def keep_memory() -> None:
-    """Have the C library keep the memory of arrays that are done with for those to come.
-
-    It gives large ones back to the system, which clears each page anew for the next: half of all
-    pages that the first motion of a session touches. glibc stops that for all that are no larger
-    than one that it has given back [mallopt(3), M_MMAP_THRESHOLD]; elsewhere this does nothing. The
-    array is never touched, and takes no memory.
-    """
-    np.empty(_KEPT, dtype=np.uint8)
-
-
 def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     """Work out what is planned, as :func:`compute` does.
 
@@ -179,7 +170,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     moments, times = plan.moments
     reducing, every = plan.tolerances is not None or plan.subframe_sampled, plan.stride
     moving = _MOVING if reducing else 1.0
-    at_once = _BONES_AT_ONCE // (_TURNS if brief else 1)
+    at_once = _BONES_IN_BRIEF if brief else _BONES_AT_ONCE
     step = max(1, at_once // max(len(plan.first.poser.bones), 1))
     posing = _posed(plan, times, step, cyclic=plan.job.in_place)
     trailing = plan.job.body.trailing
@@ -199,7 +190,8 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     # The ground is as it was planned on.
     planned, along = posed.planned or (arms, posed.going)
     framed, stays = ((each[0][::every], each[1][::every]) for each in (along, keyed))
-    measuring = _measuring(plan, planned.at(slice(None, None, every)), framed, stays)
+    turning = None if posed.turning is None else posed.turning[::every]
+    measuring = _measuring(plan, planned.at(slice(None, None, every)), framed, stays, turning)
     measured, overlaps = yield from scaled(measuring, moving, moving)
     if measured is not None and plan.carry is not None:
         measured = _rolled_up(plan, measured, posed)
@@ -222,6 +214,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
         channels=plan.job.creature.channels.written([*channels, *further]),
         automatic=not reducing,
         arms=arms,
+        phase=posed.phase[::every],
         carried=reached.carried if reached is not None else (),
         measured=measured,
         figures=found,
@@ -236,6 +229,8 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
 class _Posed:
     """A body and its arms at some moments."""
 
+    phase: Floats
+    """(moments,) radians of the gait, unwrapped."""
     arms: ArmMotion
     going: Travelled
     """As the body goes …"""
@@ -251,6 +246,8 @@ class _Posed:
     """The poses that it begins and ends in."""
     planned: tuple[ArmMotion, Travelled] | None
     """Arms, and the body as it goes, where they were planned; none where that is the world."""
+    turning: Floats | None = None
+    """Radians (moments − stride, bones) by which bones turn within a frame, where that is known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,7 +323,10 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     making_way = _separate(plan, arms, reached, going, swimming=swimming, cyclic=cyclic)
     warnings = yield from scaled(making_way, 0.96, 0.98)
     yield 0.98
-    _take_time(plan, arms, reached, going, cyclic=cyclic)
+    turning = _take_time(plan, arms, reached, going, cyclic=cyclic)
+    if hands or job.in_place or job.body.trailing is not None or plan.carry is not None:
+        # What plays is another motion yet.
+        turning = None
     planned = None
     if plan.carry is not None:
         planned, arms = (arms, going), arms.copy()
@@ -339,7 +339,8 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     own = going
     if hands and not job.in_place:
         keyed = going = object_transforms(creature.body, creature.scale, *eased)
-    return _Posed(arms, going, own, keyed, swimming, reached, warnings, hands, planned)
+    shown = (arms, going, own, keyed, swimming, reached, warnings, hands, planned, turning)
+    return _Posed(travel.phase, *shown)
 
 
 def _body_of(creature: Creature, going: Travelled) -> Travelled:
@@ -431,7 +432,8 @@ def glimpsed(
     plan: MotionPlan, arms: ArmMotion, body: Body, moments: Floats, organs: OrganPoses
 ) -> list[Glimpsed]:
     """The values of all channels at one moment (1,), of a body with its arms and organs there."""
-    posed = _Posed(arms, body.going, body.going, body.keyed, None, None, [], [], None)
+    going = body.going, body.going, body.keyed
+    posed = _Posed(body.travel.phase, arms, *going, None, None, [], [], None)
     return _values(plan, posed, moments, 0, organs)
 
 
@@ -652,8 +654,11 @@ def _take_time(
     going: Travelled,
     *,
     cyclic: bool,
-) -> None:
-    """Let bones that would turn too fast for an eye take their time, off the ground."""
+) -> Floats | None:
+    """Let bones that would turn too fast for an eye take their time, off the ground.
+
+    Radians (moments − stride, bones) by which they turn within a frame, if none did.
+    """
     job, every = plan.job, plan.stride
     creature = job.creature
     busy = reached.away > 0.0 if reached is not None else np.zeros(arms.late.shape, dtype=bool)
@@ -663,6 +668,7 @@ def _take_time(
     ]
     frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
     before, rate, per_cycle = arms.rotations, job.timing.rate, plan.pace.fastest
+    turning = turns_in_world(frames, before, going[1], every)
     for number in range(_EASINGS):
         eased = eased_turns(
             *(frames, arms.rotations, going[1], held),
@@ -670,6 +676,7 @@ def _take_time(
             per_cycle=per_cycle,
             every=every,
             cyclic=cyclic,
+            turning=turning if number == 0 else None,
         )
         if eased is None:
             break
@@ -684,12 +691,13 @@ def _take_time(
             closer = MARGIN if last else 0.0
             arms.rotations = keep_off_ground(course, poses, radii, changed, closer=closer)
     if arms.rotations is before:
-        return
+        return turning
     # Where it is no help, it is no good either.
     most = fastest_turn(rate, per_cycle)
     arms.rotations = where_it_helps(
         *(frames, before, arms.rotations, going[1]), most=most, every=every, cyclic=cyclic
     )
+    return None
 
 
 def _trail(plan: MotionPlan, trailing: Trailing, posed: _Posed) -> Steps[None]:
@@ -725,7 +733,7 @@ def _opened(plan: MotionPlan, count: int, swimming: Floats | None) -> Opened | N
 
 
 def _measuring(
-    plan: MotionPlan, arms: ArmMotion, going: Travelled, keyed: Travelled
+    plan: MotionPlan, arms: ArmMotion, going: Travelled, keyed: Travelled, turning: Floats | None
 ) -> Generator[None, None, tuple[Measured | None, tuple[str, ...]]]:
     """In steps, what figures are taken from, where they are wanted, and what overlaps in words."""
     job, creature, separation, every = plan.job, plan.job.creature, None, 1
@@ -761,6 +769,7 @@ def _measuring(
         rate=job.timing.rate,
         stays=keyed if job.in_place else None,
         floor=floor,
+        turning=turning,
     )
     return measured, overlaps
 

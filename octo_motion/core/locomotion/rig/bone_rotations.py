@@ -387,6 +387,10 @@ def transport_frames(directions: Floats, first: Floats) -> Floats:
 # where its segment points. Components come first and the batch last, as in
 # ``rotations.components_first``.
 
+EACH_ARM: Final = (slice(None), None)
+"""Which arm each item of a batch is, whose shape is (arms, moments): nothing has to be gathered."""
+_Which = np.ndarray | tuple[slice, None]
+
 
 @dataclass(frozen=True, eq=False)
 class ArmBatch:
@@ -415,11 +419,12 @@ class ArmBatch:
         )
 
     def orientations(
-        self, rotations: Floats, arm: np.ndarray, armature: Floats | None = None
+        self, rotations: Floats, arm: _Which, armature: Floats | None = None
     ) -> Floats:
         """Orientations (bones, 4, batch) in armature space, of rotations (bones, 4, batch) in each
         bone's rest frame; ``arm`` (batch,) is which of the arms each one is. They are of the world
-        where that of the armature (4, batch) is given.
+        where that of the armature (4, batch) is given. With ``EACH_ARM`` the batch is (arms,
+        moments).
         """
         result = np.empty(rotations.shape)
         for bone, own in enumerate(rotations):
@@ -439,21 +444,22 @@ class ArmBatch:
         return result
 
     def _carried(
-        self, bone: int, arm: np.ndarray, before: Floats | None, armature: Floats | None = None
+        self, bone: int, arm: _Which, before: Floats | None, armature: Floats | None = None
     ) -> Floats:
         """Where a bone of arms (batch,) is when it is not turned (4, batch), in armature space or
         that of the armature (4, batch).
 
         That hangs on the orientation of the bone before (4, batch).
         """
-        carried = self.carried[bone][:, arm]
+        place = arm if isinstance(arm, tuple) else (arm,)
+        carried = self.carried[bone][(slice(None), *place)]
         follows = self.follows[bone]
         if before is None or not follows.all():
             # Of those that follow nothing it is in armature space already.
             free = carried if armature is None else components_first.multiply(armature, carried)
             if before is None or not follows.any():
                 return free
-            return np.where(follows[arm], components_first.multiply(before, carried), free)
+            return np.where(follows[place], components_first.multiply(before, carried), free)
         return components_first.multiply(before, carried)
 
     def joints(self, orientations: Floats, arm: np.ndarray, strains: Floats) -> Floats:
@@ -483,7 +489,7 @@ def batches_by_bones(arms: Sequence[ArmFrames]) -> list[tuple[list[int], ArmBatc
     ]
 
 
-_TURNS_AT_ONCE: Final = 40_000
+_TURNS_AT_ONCE: Final = 100_000
 """Bones times moments whose turns are worked out in one portion, which the cache then holds."""
 
 
@@ -506,11 +512,8 @@ def turns_in_world(
         bones = np.stack([np.arange(*ends[number : number + 2]) for number in numbers], axis=-1)
         for start in range(0, count, step):
             part = slice(start, min(start + step, count) + every)
-            own = rotations[part].transpose(1, 2, 0)[bones.T].transpose(1, 2, 0, 3)
-            arm = np.repeat(np.arange(len(numbers)), own.shape[3])
-            going = np.tile(orientations[part].T, (1, len(numbers)))
-            own = own.reshape(*own.shape[:2], -1)
-            world = batch.orientations(own, arm, going).reshape(*own.shape[:2], len(numbers), -1)
+            own = rotations[part].transpose(1, 2, 0)[bones].transpose(0, 2, 1, 3)
+            world = batch.orientations(own, EACH_ARM, orientations[part].T[:, None])
             same = np.einsum("bcaf,bcaf->fba", world[..., every:], world[..., :-every])
             result[part.start : part.stop - every, bones] = same
     np.abs(result, out=result)

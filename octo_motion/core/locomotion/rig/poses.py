@@ -353,6 +353,7 @@ def eased_turns(
     per_cycle: float,
     every: int = 1,
     cyclic: bool = False,
+    turning: Floats | None = None,
 ) -> tuple[Floats, Floats] | None:
     """Arms whose bones turn no faster than an eye can follow, wherever they are free to.
 
@@ -365,6 +366,7 @@ def eased_turns(
         per_cycle: … and in a cycle of the gait.
         every: at every how many moments there is a frame.
         cyclic: whether the last moment is the first again.
+        turning: what :func:`turns_in_world` says of them, if that is known.
 
     Returns:
         Rotations (moments, bones, 4), and how far each arm was changed (moments, arms), 0…1; none
@@ -372,7 +374,9 @@ def eased_turns(
     """
     most = fastest_turn(rate, per_cycle)
     result, changed, start = rotations, np.zeros((len(rotations), len(arms))), 0
-    fast = (turns_in_world(arms, rotations, orientations, every) > most).any(axis=0)
+    if turning is None:
+        turning = turns_in_world(arms, rotations, orientations, every)
+    fast = (turning > most).any(axis=0)
     for number, arm in enumerate(arms):
         own = slice(start, start + len(arm.bones))
         start = own.stop

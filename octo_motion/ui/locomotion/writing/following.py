@@ -205,9 +205,6 @@ class Following:
         yield from self._made()
 
     def _made(self) -> Iterator[float]:
-        assert self.shot.result is not None
-        self.shot.quarters = self.shot.passed_quarters(self.shot.result)
-        yield 1.0
         armature = bpy.data.objects.get((self.shot.armature, None))
         previous = None
         if armature is not None:

@@ -47,7 +47,6 @@ from ....core.locomotion.motion import (
     schedule,
     shown_contacts,
 )
-from ....core.locomotion.path import plan_travel
 from ....core.locomotion.reaching import Carried
 from ....core.phrases import as_phrase, joined_phrases, phrase
 from ....core.rotations import Floats
@@ -196,8 +195,6 @@ class Shot:
     """What :meth:`write` has made …"""
     told: tuple[str, ...] = ()
     """… and what there is to know of the poses that it found."""
-    quarters: list[float] | None = None
-    """What :meth:`passed_quarters` says of it, if that is known already."""
     seed: int | None = None
     """The seed that it was made with, if its settings may have another."""
 
@@ -368,25 +365,12 @@ class Shot:
             settings.result = previous
             raise
         settings.result = action
-        action[CYCLES] = self.quarters or self.passed_quarters(made)
+        action[CYCLES] = _passed_quarters(made)
         if layer is not None:
             assert previous is not None
             follow(armature, layer, (previous, action), cycles)
         rest_properties(armature, passing - {each.data_path for each in channels})
         return action
-
-    @staticmethod
-    def passed_quarters(made: MotionResult) -> list[float]:
-        """Frames at which the gait passes quarters of its cycles."""
-        when, standing = made.plan.schedule, made.plan.first.standing
-        bearings = standing.bearings if standing is not None else None
-        travel = plan_travel(when.route, when.travel, when.times, bearings)
-        # Not by np.unique, whose first call imports numpy's masked arrays.
-        order = np.argsort(travel.phase, kind="stable")
-        first = order[np.diff(travel.phase[order], prepend=-np.inf) > 0.0]
-        phases = travel.phase[first]
-        wanted = 0.5 * np.pi * np.arange(np.floor(phases[-1] / (0.5 * np.pi)) + 1.0)
-        return np.interp(wanted, phases, when.frames[first]).tolist()
 
     def _at_rest(
         self,
@@ -442,6 +426,16 @@ class Shot:
         return (
             (phrase("The scene now ends at frame {end}.", end=scene.frame_end),) if changed else ()
         )
+
+
+def _passed_quarters(made: MotionResult) -> list[float]:
+    """Frames at which the gait passes quarters of its cycles."""
+    # Not by np.unique, whose first call imports numpy's masked arrays.
+    order = np.argsort(made.phase, kind="stable")
+    first = order[np.diff(made.phase[order], prepend=-np.inf) > 0.0]
+    phases = made.phase[first]
+    wanted = 0.5 * np.pi * np.arange(np.floor(phases[-1] / (0.5 * np.pi)) + 1.0)
+    return np.interp(wanted, phases, made.frames[first]).tolist()
 
 
 def show_contacts(
