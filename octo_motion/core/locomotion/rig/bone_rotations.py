@@ -339,16 +339,14 @@ def frames_of_arm(skeleton: Skeleton, bones: Sequence[str], body: BodyFrame) -> 
     inward = body.center - joints[:-1]
     inward -= np.outer(inward @ down, down)
     back = conjugate(orientations)
-    ways = rotate(back, down), rotate(back, normalized(inward))
-    facing = np.empty((len(order), 3))
-    for place, bone in enumerate(order):
-        named = skeleton.sucker_axes[bone]
-        along = rest.segments[place]
-        choices = [np.array(AXES[named], float)] if named in AXES else []
-        choices += [way[place] for way in ways]
-        choices += [np.eye(3)[np.argmin(np.abs(along))]]
-        sides = (choice - (choice @ along) * along for choice in choices)
-        facing[place] = next(each for each in sides if np.linalg.norm(each) > _NEARLY_ALONG)
+    along = rest.segments
+    named = np.array([AXES.get(skeleton.sucker_axes[bone], (0.0, 0.0, 0.0)) for bone in order])
+    least = np.eye(3)[np.argmin(np.abs(along), axis=-1)]
+    choices = np.stack([named, rotate(back, down), rotate(back, normalized(inward)), least])
+    sides = choices - np.sum(choices * along, axis=-1, keepdims=True) * along
+    # The first that tells which side is which; what has no name is of no length.
+    first = np.argmax(np.linalg.norm(sides, axis=-1) > _NEARLY_ALONG, axis=0)
+    facing = sides[first, np.arange(len(order))]
     own = frame_of(rest.segments, facing)
     return ArmFrames(tuple(bones), joints[0], np.linalg.norm(steps, axis=1), rest, own)
 
