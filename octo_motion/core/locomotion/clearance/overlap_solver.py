@@ -53,12 +53,12 @@ def turned_towards(
     count = lengths.shape[1]
     ease = np.sqrt(free)
     lever = lengths * ease
-    # Which joints are moved by turning a segment: all that come after it.
-    after = np.tril(np.ones((count, count)))
-    # Sums over the joints after both of two segments, those after the later one.
-    beyond = np.cumsum(weights[:, ::-1], axis=1)[:, ::-1]
-    later = np.maximum.outer(np.arange(count), np.arange(count))
-    matrix = beyond[:, later] * lever[:, :, None] * lever[:, None, :]
+    # Turning a segment moves all joints that come after it. Sums over the joints after both of two
+    # segments are those after the later one.
+    beyond = _sums_beyond(weights)
+    matrix = np.take(beyond, np.maximum.outer(np.arange(count), np.arange(count)), axis=1)
+    matrix *= lever[:, :, None]
+    matrix *= lever[:, None, :]
     # Of segments of no length, too, but little of that of the others.
     stiff = lengths**2 + _TINY * np.max(lengths**2, axis=1, keepdims=True)
     rows = np.arange(count)
@@ -69,20 +69,32 @@ def turned_towards(
     mixed = between * ease[:, 1:] * ease[:, :-1]
     matrix[:, rows[1:], rows[:-1]] -= mixed
     matrix[:, rows[:-1], rows[1:]] -= mixed
-    right = lever[..., None] * np.einsum("jk,ijc->ikc", after, weights[..., None] * goals)
+    right = lever[..., None] * _sums_beyond(weights[..., None] * goals)
     turn = ease[..., None] * np.linalg.solve(matrix, right)
-    turn -= np.sum(turn * directions, axis=2, keepdims=True) * directions
-    most = np.sqrt(np.max(np.sum(turn**2, axis=2), axis=1))[:, None, None]
+    turn -= np.einsum("isc,isc->is", turn, directions)[..., None] * directions
+    most = _length(turn).max(axis=1)[:, None, None]
     result = directions + turn / np.sqrt(1.0 + (most / _BOLD) ** 2)
-    size = np.linalg.norm(result, axis=2, keepdims=True)
     turns = (free > 0.0) & (lengths > 0.0)
-    return np.where(turns[..., None], result / np.maximum(size, _TINY), directions)
+    return np.where(turns[..., None], _unit(result), directions)
+
+
+def _sums_beyond(values: Floats) -> Floats:
+    """Sums (chains, segments, …) of values, each of its own segment and all after it."""
+    result = values.copy()
+    for segment in range(values.shape[1] - 2, -1, -1):
+        result[:, segment] += result[:, segment + 1]
+    return result
 
 
 def joints_of(roots: Floats, directions: Floats, lengths: Floats) -> Floats:
     """Joints (chains, segments + 1, 3) of chains that begin at roots (chains, 3)."""
-    steps = np.concatenate([roots[:, None], lengths[..., None] * directions], axis=1)
-    return np.cumsum(steps, axis=1)
+    chains, segments, _ = directions.shape
+    result = np.empty((chains, segments + 1, 3))
+    result[:, 0] = roots
+    np.multiply(lengths[..., None], directions, out=result[:, 1:])
+    for segment in range(segments):
+        result[:, segment + 1] += result[:, segment]
+    return result
 
 
 _ROUNDS: Final = 12
@@ -125,7 +137,7 @@ _MOSTLY: Final = 0.5
 """Share of all frames from which on two capsules that overlap belong together."""
 _REPEATS: Final = 3
 """How often arms that could not make way well are looked for."""
-_ARMS_AT_ONCE: Final = 512
+_ARMS_AT_ONCE: Final = 1024
 """Arms at some frame that are turned in one go …"""
 _COLUMNS_AT_ONCE: Final = 32
 """… and joints whose ways are evened out over all frames in one go."""
