@@ -16,6 +16,7 @@ from octo_motion.core.keyframes.channels import Channel
 from octo_motion.core.locomotion.rig.poses import Poses, halfway_automatic
 from octo_motion.core.rotations import EULER_ORDERS, Floats
 
+HANDLES = ("handle_left", "handle_right")
 ROTATION_MODES = ("QUATERNION", "AXIS_ANGLE", *EULER_ORDERS)
 
 
@@ -97,6 +98,26 @@ def test_bones_play_back_the_rotations_they_were_given(mode: str) -> None:
     for frame, wanted in zip(frames, rotations.to_matrix(motion), strict=True):
         np.testing.assert_allclose(basis_rotations(obj, frame), wanted, atol=1e-5)
     assert {bone.rotation_mode for bone in pose_bones(obj)} == {mode}
+
+
+@pytest.mark.parametrize("automatic", [False, True])
+def test_handles_are_where_blender_puts_them(automatic: bool) -> None:
+    obj = make_armature()
+    names = [bone.name for bone in pose_bones(obj)]
+    # More than Blender works on in one go.
+    frames = np.arange(1.0, 701.0)
+    channels = actions.read_channels(obj, names).rotations(names, wandering(700, 3))
+    action = None
+    for _ in range(2):
+        action = actions.write_action(
+            *(obj, "Walk", frames, channels), previous=action, automatic=automatic
+        )
+        for curve in channelbag(action).fcurves:
+            places = [actions.key_points(curve, name) for name in ("co", *HANDLES)]
+            curve.update()
+            again = [actions.key_points(curve, name) for name in ("co", *HANDLES)]
+            assert np.array_equal(places, again)
+            assert np.ptp(places[1][:, 0]) > 600.0
 
 
 def test_each_bone_keeps_its_own_rotation_mode() -> None:

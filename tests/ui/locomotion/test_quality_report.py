@@ -13,6 +13,7 @@ import pytest
 
 from octo_motion.core.locomotion.metrics import report as quality
 from octo_motion.core.locomotion.metrics.report import KINDS, Figure, Measured
+from octo_motion.core.locomotion.rig import turns_in_world
 from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import angle_between, rotate
 from octo_motion.ui.locomotion.operators import quality as quality_operators
@@ -114,6 +115,29 @@ def test_the_figure_of_the_depth_is_what_blender_plays_between_frames(octopus: A
         deepest = max(deepest, below.max() / shot.generator.lengths[number])
     # The object's Euler angles do not go quite the way of its quaternions.
     assert deepest == pytest.approx(figure.value, abs=1e-3)
+
+
+@pytest.mark.parametrize("halves", [False, True])
+def test_turns_are_worked_out_once_and_are_those_of_the_motion(
+    octopus: Any, *, halves: bool
+) -> None:
+    octopus.octo_motion.locomotion.steady = 0.0
+    shot = prepare(octopus, bpy.context)
+    shot.on_frames_alone = not halves
+    for _ in shot.compute():
+        pass
+
+    measured = shot.result.measured
+
+    assert measured is not None
+    assert (shot.every == 2) == halves
+    poses = measured.poses
+    turns = turns_in_world(measured.arms, poses.rotations, poses.orientations)
+    assert measured.turning is not None
+    # Of small angles the arc cosine keeps half the digits.
+    np.testing.assert_allclose(measured.turning, turns, atol=1e-7)
+    (turn,) = [each for each in shot.result.figures if each.kind == "TURN"]
+    assert turn.value == pytest.approx(turns.max(), rel=1e-9)
 
 
 def test_a_swim_has_no_slip(small: Any) -> None:

@@ -127,6 +127,20 @@ def test_closing_what_is_closed_changes_nothing_to_speak_of(seed: int, count: in
 
 
 @given(seeds, counts)
+def test_a_group_is_solved_alike_alone_and_among_others(seed: int, count: int) -> None:
+    directions, lengths, goal = a_group(seed, count)
+    weights = np.full(count, 0.4)
+
+    among = closed(swept(directions, lengths, weights, goal), lengths, goal)
+
+    for number in range(len(goal)):
+        one = slice(number, number + 1)
+        moved = swept(directions[:, one], lengths, weights, goal[one])
+        alone = closed(moved, lengths, goal[one])
+        np.testing.assert_allclose(alone, among[:, one], atol=1e-12)
+
+
+@given(seeds, counts)
 def test_a_goal_out_of_reach_is_pointed_at_with_a_stretched_group(seed: int, count: int) -> None:
     directions, lengths, goal = a_group(seed, count)
     goal = normalized(goal) * 1.5 * lengths.sum()
