@@ -101,7 +101,7 @@ def test_bones_play_back_the_rotations_they_were_given(mode: str) -> None:
 
 
 @pytest.mark.parametrize("automatic", [False, True])
-def test_handles_are_where_blender_puts_them(automatic: bool) -> None:
+def test_handles_are_where_blender_puts_them(*, automatic: bool) -> None:
     obj = make_armature()
     names = [bone.name for bone in pose_bones(obj)]
     # More than Blender works on in one go.

@@ -217,7 +217,7 @@ def measuring_keyed(
     halfway = yield from _played_poses(
         *(halfway_linear(measured.poses), creature, by_path, frames, halves), travels=travels
     )
-    return replace(measured, poses=poses, halfway=halfway)
+    return replace(measured, poses=poses, halfway=halfway, turning=None)
 
 
 def _played_poses(
