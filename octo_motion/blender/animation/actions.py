@@ -803,8 +803,7 @@ def _tell(curve: bpy.types.FCurve, filled: _Filled, channel: Channel) -> _Filled
         curve.keyframe_points.handles_recalc()
         return replace(filled, told=True)
     curve.update()
-    handles = _handles(curve) if channel.keys is not None else None
-    return _Filled(filled.count, filled.digest, handles, filled.had_own_handles)
+    return replace(filled, handles=_handles(curve), told=True)
 
 
 def _read_keys(curve: bpy.types.FCurve) -> dict[str, np.ndarray]:

@@ -186,12 +186,11 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     yield moving
     motion, further = _motion(plan, posed, moments, organs)
     yield moving
-    on_frames = arms.at(slice(None, None, every))
+    on_frames = slice(None, None, every)
     # The ground is as it was planned on.
     planned, along = posed.planned or (arms, posed.going)
-    framed, stays = ((each[0][::every], each[1][::every]) for each in (along, keyed))
-    turning = None if posed.turning is None else posed.turning[::every]
-    measuring = _measuring(plan, planned.at(slice(None, None, every)), framed, stays, turning)
+    framed, stays = ((each[0][on_frames], each[1][on_frames]) for each in (along, keyed))
+    measuring = _measuring(plan, planned.at(on_frames), framed, stays, posed.turning)
     measured, overlaps = yield from scaled(measuring, moving, moving)
     if measured is not None and plan.carry is not None:
         measured = _rolled_up(plan, measured, posed)
@@ -201,9 +200,8 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
         yield moving
         channels = yield from scaled(_reduced(plan, motion, moments, every), moving, 1.0)
         if measured is not None and plan.carry is None:
-            travels = not plan.job.in_place
-            keyed_so = measuring_keyed(measured, plan.job.creature, channels, travels=travels)
-            measured = yield from keyed_so
+            keyed_so = measured, plan.job.creature, channels
+            measured = yield from measuring_keyed(*keyed_so, travels=not plan.job.in_place)
             yield 1.0
     found = (yield from finding_figures(measured)) if measured is not None else ()
     yield 1.0
@@ -218,7 +216,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
         carried=reached.carried if reached is not None else (),
         measured=measured,
         figures=found,
-        warnings=(*warnings, *warnings_for_misses(plan, on_frames), *overlaps),
+        warnings=(*warnings, *warnings_for_misses(plan, arms.at(on_frames)), *overlaps),
         notes=reached.notes if reached is not None else (),
     )
     yield 1.0
@@ -769,7 +767,7 @@ def _measuring(
         rate=job.timing.rate,
         stays=keyed if job.in_place else None,
         floor=floor,
-        turning=turning,
+        turning=None if turning is None else turning[:: plan.stride],
     )
     return measured, overlaps
 
