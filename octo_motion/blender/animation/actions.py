@@ -27,7 +27,6 @@ from ...core.keyframes import (
     RigChannels,
     rotation_property,
 )
-from ...core.memory import ROOM, keep_memory
 from ...core.phrases import phrase
 from ...core.rotations import IDENTITY, Floats, from_matrix, from_mode_values
 from ...core.steps import finished
@@ -58,8 +57,6 @@ CHANNELS_AT_ONCE: Final = 6
 or so."""
 _CURVES_AT_ONCE: Final = 50
 """How many are read at one step to see whether they have been edited."""
-_KEY_BYTES: Final = 88
-"""Of a key in Blender's memory, about."""
 _LEAST_SPACING: Final = 0.01
 """Blender takes keys that are no further apart, in frames, for one and the same."""
 
@@ -556,10 +553,7 @@ class _Written:
         curves = {(curve.data_path, curve.array_index): curve for curve in channelbag.fcurves}
         # Everything goes through the same few buffers: memory stays modest, however many the bones.
         points, kinds = _dense_keys(times, automatic=automatic)
-        often = max(1, ROOM // (_KEY_BYTES * 4 * len(times)))
-        for number, channel in enumerate(channels):
-            if number % often == 0:
-                keep_memory()
+        for channel in channels:
             own = None
             for component in range(channel.values.shape[1]):
                 place = (channel.data_path, component)
@@ -594,8 +588,6 @@ class _Written:
         for curve in curves.values():
             # Its group goes with the last of its curves.
             channelbag.fcurves.remove(curve)
-        # Blender's evaluation gets a copy of them all.
-        keep_memory()
 
 
 def _dense_keys(times: np.ndarray, *, automatic: bool) -> tuple[np.ndarray, np.ndarray]:
