@@ -10,8 +10,8 @@ import numpy as np
 _KEPT: Final = 2**25 - 2**16
 """Bytes of the largest arrays whose memory is kept: glibc keeps that of none beyond 2**25."""
 _LARGE: Final = 31 * 2**20
-"""Bytes of two arrays that together are less than what glibc gives back as soon as it is free. Large
-pages for more gain nothing: where the system has none at hand, it takes long to find them."""
+"""Bytes of two arrays that together are less than what glibc gives back as soon as it is free.
+Large pages for more gain nothing: where the system has none at hand, it takes long to find them."""
 
 
 def keep_memory() -> None:
