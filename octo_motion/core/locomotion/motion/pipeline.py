@@ -14,7 +14,6 @@ from typing import Final, TypeVar
 import numpy as np
 
 from ...keyframes import Channel
-from ...memory import keep_memory
 from ...phrases import phrase
 from ...rotations import IDENTITY, Floats, conjugate, from_matrix, multiply, rotate, slerp
 from ..body import BodyMoments, OrganPoses, pose_organs
@@ -105,6 +104,11 @@ class MotionResult:
 MISS: Final = TOLD["MISS"]
 """Arm lengths by which a target may be missed without a word."""
 
+_KEPT: Final = 2**25 - 2**16
+"""Bytes of the largest arrays whose memory is kept: glibc keeps that of none beyond 2**25."""
+_LARGE: Final = 31 * 2**20
+"""Bytes of two arrays that together are less than what glibc gives back as soon as it is free.
+Large pages for more gain nothing: where the system has none at hand, it takes long to find them."""
 _PLANNING: Final = 0.1
 """Share of the work that is over when the motion is planned …"""
 _TRAILING: Final = 0.7
@@ -159,6 +163,24 @@ def compute(job: MotionJob, *, brief: bool = False) -> Steps[MotionResult]:
     keep_memory()
     plan = yield from scaled(plan_motion(job), 0.0, _PLANNING)
     return (yield from scaled(pose(plan, brief=brief), _PLANNING, 1.0))
+
+
+def keep_memory() -> None:
+    """Have the C library keep the memory of arrays that are done with for those to come, and the
+    system give what comes next in large pages.
+
+    glibc gives large arrays back to the system, which clears each page anew for the next: half of
+    all pages that the first motion of a session touches. It stops that for all that are no larger
+    than one that it has given back [mallopt(3), M_MMAP_THRESHOLD]. From then on they stand on its
+    heap, as keys do that Blender allocates. For arrays of some megabytes numpy asks the system for
+    large pages [madvise(2), MADV_HUGEPAGE], which stays so where they have stood: what comes there
+    next, whoever allocates it, has one page where it would have 512.
+
+    Elsewhere this does nothing. The arrays are never touched, and take no memory.
+    """
+    np.empty(_KEPT, dtype=np.uint8)
+    # Both at once: one after the other they would stand in the same place.
+    _ = [np.empty(_LARGE, dtype=np.uint8) for _ in range(2)]
 
 
 def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:

@@ -11,7 +11,7 @@ import pytest
 PAGES = """
 import resource
 import numpy as np
-from octo_motion.core.memory import keep_memory
+from octo_motion.core.locomotion.motion.pipeline import keep_memory
 
 def touched():
     return resource.getrusage(resource.RUSAGE_SELF).ru_minflt
