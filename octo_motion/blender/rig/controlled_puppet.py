@@ -32,6 +32,7 @@ from .controls import (
     is_correction,
     reaches,
     set_bone_values,
+    spline_leads,
 )
 from .limb_points import LimbPoints
 from .puppet import Puppet
@@ -253,6 +254,11 @@ class ControlledPuppet(Puppet):
         assert shown.pose is not None
         bones, world = shown.pose.bones, shown.matrix_world
         points = self._start[: 2 * len(self.figure)] * self._size
+        self._leading |= {
+            name
+            for name in spline_leads(armature) & set(self._limbs)
+            if self._trunk not in self._limbs[name]
+        }
         led_bodies: list[tuple[int, int]] = []
         self._reaches: list[tuple[Reach, list[int]]] = []
         self._poles: dict[str, Floats] = {}

@@ -122,17 +122,49 @@ def reaches(armature: bpy.types.Object) -> list[Reach]:
     return found
 
 
+def spline_leads(armature: bpy.types.Object) -> set[str]:
+    """Bones that bend the curves along which inverse kinematics lay chains now."""
+    assert armature.pose is not None
+    return {
+        name
+        for bone in armature.pose.bones
+        for each in bone.constraints
+        if each.type == "SPLINE_IK" and not each.mute and each.influence > 0.0
+        for name in _targets(each, armature.name)
+    }
+
+
 def _targets(constraint: Any, armature: str) -> set[str]:
-    found = set()
+    """Bones of the armature, by its name, on which what a constraint follows depends."""
+    found: set[str] = set()
     for kind in ("", "pole_"):
         target = getattr(constraint, f"{kind}target", None)
-        name = getattr(constraint, f"{kind}subtarget", "")
-        if target is not None and name and target.name == armature:
-            found.add(name)
+        found |= _bones_behind(target, getattr(constraint, f"{kind}subtarget", ""), armature)
     for each in getattr(constraint, "targets", ()):
-        weighs = getattr(each, "weight", 1.0) > 0.0
-        if each.target is not None and each.subtarget and each.target.name == armature and weighs:
-            found.add(each.subtarget)
+        if getattr(each, "weight", 1.0) > 0.0:
+            found |= _bones_behind(each.target, each.subtarget, armature)
+    return found
+
+
+def _bones_behind(
+    target: Any, subtarget: str, armature: str, passed: frozenset[str] = frozenset()
+) -> set[str]:
+    """The bone of the armature that is meant, or those that carry another object or bend it, as
+    hooks bend the curve of a spline; objects that were passed on the way are not looked at again.
+    """
+    if target is None or target.name in passed:
+        return set()
+    if target.name == armature:
+        return {subtarget} if subtarget else set()
+    passed |= {target.name}
+    found = _bones_behind(target.parent, target.parent_bone, armature, passed)
+    for each in (*target.modifiers, *target.constraints):
+        own: Any = each
+        if each.type == "HOOK":
+            found |= _bones_behind(own.object, own.subtarget, armature, passed)
+        elif getattr(own, "influence", 0.0) > 0.0 and not own.mute:
+            more = getattr(own, "target", None), getattr(own, "subtarget", "")
+            found |= _bones_behind(*more, armature, passed)
     return found
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
@@ -60,6 +60,8 @@ MOST_LIMBS: Final = 300
 
 _TOLERANT: Final = frozenset({"LIMIT_ROTATION", "LIMIT_LOCATION", "LIMIT_SCALE", "MAINTAIN_VOLUME"})
 """Constraints under which a bone still turns as its keys say."""
+_CARRYING: Final = _TOLERANT | {"CHILD_OF"}
+"""Constraints under which it does too, though something else than its parent carries it."""
 _ANGLE_LIMIT: Final = 2.0 * np.pi - 1e-4
 """A range as wide as a whole turn limits nothing; less what single precision loses of it."""
 _PART: Final = re.compile(r"\.\d+$")
@@ -143,6 +145,7 @@ def read_rig(armature: bpy.types.Object, *, smallest: float = SMALLEST) -> Puppe
         locked=_locked_bones(armature),
         smallest=smallest,
         goals=frozenset(goal_bones(armature)),
+        followed=_followed(armature),
     )
     roles, needs = _roles(armature, skeleton, facts)
     if len(roles.bodies) > MOST_LIMBS:
@@ -201,7 +204,7 @@ def _roles(
             skeleton.names[above] for each in found.bodies for above in skeleton.ancestors(each)
         }
         beside = set().union(*(needs[each] for each in lost if each in limbs)) - limbs - carried
-        if control_names(armature, beside):
+        if control_names(armature, beside | (limbs & carried_bones(armature))):
             return found, {name: frozenset(needs[name]) for name in limbs}
     return roles or find_roles(skeleton, facts, armature.name), {}
 
@@ -310,6 +313,34 @@ def moved_bones(armature: bpy.types.Object) -> frozenset[str]:
         if channel.startswith("rotation_") and not driver.mute
     )
     return frozenset(found)
+
+
+def carried_bones(armature: bpy.types.Object) -> set[str]:
+    """Names of the bones that turn by their own rotation, but that not only their parent carries.
+
+    Controls that change spaces are such ones.
+    """
+    assert armature.pose is not None
+    acting = {
+        bone.name: {each.type for each in bone.constraints if _acts(each)}
+        for bone in armature.pose.bones
+    }
+    return {name for name, kinds in acting.items() if kinds <= _CARRYING and not kinds <= _TOLERANT}
+
+
+def _followed(armature: bpy.types.Object) -> str:
+    """Name of the other armature that bones follow by their constraints, most of them; or none."""
+    assert armature.pose is not None
+    targets: list[Any] = [
+        getattr(each, "target", None)
+        for bone in armature.pose.bones
+        for each in bone.constraints
+        if _acts(each)
+    ]
+    others = Counter(
+        each.name for each in targets if each and each.type == "ARMATURE" and each != armature
+    )
+    return others.most_common(1)[0][0] if others else ""
 
 
 def bent_bones(armature: bpy.types.Object) -> set[str]:

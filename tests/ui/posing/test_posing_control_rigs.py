@@ -10,6 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
+from octo_motion.core.errors import RigError
 from octo_motion.core.rotations import Floats
 from octo_motion.ui.posing.puppet_session import PuppetSession
 
@@ -95,10 +96,27 @@ def by_driver() -> Any:
     return armature
 
 
+def by_child_of() -> Any:
+    """The thigh hangs on the hips by a constraint that changes spaces, and is turned by itself."""
+    armature = body()
+    for name in ("root", "goal", "pole"):
+        armature.data.bones[name].use_deform = False
+    bpy.ops.object.mode_set(mode="EDIT")
+    armature.data.edit_bones["thigh"].parent = None
+    bpy.ops.object.mode_set(mode="OBJECT")
+    child_of = constrain(armature, "thigh", "CHILD_OF", "hips")
+    child_of.inverse_matrix = (
+        armature.matrix_world @ armature.pose.bones["hips"].matrix
+    ).inverted()
+    bpy.context.view_layer.update()
+    return armature
+
+
 RIGS: dict[str, tuple[Callable[[], Any], str, set[str]]] = {
     "goal and pole": (by_goal_and_pole, "", {"goal", "pole"}),
     "hidden beneath": (lambda: deforming(by_goal_and_pole()), "DEF-", {"goal", "pole"}),
     "driver": (by_driver, "", {"lever", "thigh"}),
+    "child of": (by_child_of, "", {"thigh"}),
 }
 
 
@@ -152,8 +170,9 @@ def test_controls_get_the_keys_that_give_the_pose_of_a_limb_that_was_pulled(name
     assert session.missed == ""
     assert set(names) == keyed(armature)
     assert set(names) & controls
-    # Nothing of what a constraint or a driver moves is keyed: its keys would have no effect.
-    assert not set(names) & ({"shin"} | {f"DEF-{each}" for each in LIMBS})
+    # Nothing of what a constraint or a driver bends is keyed: its keys would have no effect.
+    bent = {"shin"} if name != "child of" else set()
+    assert not set(names) & (bent | {f"DEF-{each}" for each in LIMBS})
     for control in armature.pose.bones:
         control.matrix_basis.identity()
     scene.frame_set(11)
@@ -248,6 +267,73 @@ def test_controls_that_each_do_little_are_moved_where_few_do_not_reach(
     session.finish()
     assert not told
     assert np.linalg.norm(shown - pose, axis=1).max() < MILLIMETRE * size / 1.7
+
+
+CONTROLS = ("start", "near", "far", "end")
+
+
+def along_a_curve() -> Any:
+    """A tail of six limbs along a curve that four controls bend by hooks."""
+    limbs: dict[str, Any] = {"trunk": ("", (0, 0, 0.5), (0, 0, 0.8))}
+    for number in range(6):
+        above = f"tail{number - 1}" if number else "trunk"
+        limbs[f"tail{number}"] = (above, (0.2 * number, 0, 0.5), (0.2 * number + 0.2, 0, 0.5))
+    for number, name in enumerate(CONTROLS):
+        limbs[name] = ("trunk", (0.4 * number, 0, 0.5), (0.4 * number, 0, 0.7))
+    armature = rig(**limbs)
+    data = bpy.data.curves.new("Curve", "CURVE")
+    data.dimensions = "3D"
+    spline = data.splines.new("NURBS")
+    spline.points.add(len(CONTROLS) - 1)
+    spline.use_endpoint_u = True
+    curve = bpy.data.objects.new("Curve", data)
+    bpy.context.scene.collection.objects.link(curve)
+    for number, name in enumerate(CONTROLS):
+        armature.data.bones[name].use_deform = False
+        spline.points[number].co = (0.4 * number, 0.0, 0.5, 1.0)
+        hook: Any = curve.modifiers.new(name, "HOOK")
+        hook.object, hook.subtarget = armature, name
+        hook.vertex_indices_set([number])
+        hook.matrix_inverse = armature.pose.bones[name].matrix.inverted()
+    constraint: Any = armature.pose.bones["tail5"].constraints.new("SPLINE_IK")
+    constraint.target, constraint.chain_count = curve, 6
+    bpy.context.view_layer.update()
+    return armature
+
+
+@pytest.mark.parametrize("by", [(-0.1, -0.25, 0.2), (-0.2, 0.2, -0.1)])
+def test_tail_along_a_curve_is_posed_by_what_hooks_the_curve(
+    by: tuple[float, float, float],
+) -> None:
+    """Such limbs were told to be moved by constraints, and could not be taken. Four hooks cannot
+    lay six limbs everywhere: what is left is told."""
+    armature = along_a_curve()
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    drag(session, "tail5", by)
+    names = session.key()
+    limbs = [f"tail{number}" for number in range(6)]
+    places = [session.body(each) for each in limbs]
+    goal = session.core.pose.positions[places] / session.unit
+    told, size = session.missed, session.size
+    session.finish()
+    bpy.context.view_layer.update()
+    shown = np.array([armature.matrix_world @ armature.pose.bones[each].head for each in limbs])
+    off = float(np.linalg.norm(shown - goal, axis=1).max())
+    assert set(names) <= {*CONTROLS, "trunk"}
+    assert set(names) & set(CONTROLS)
+    assert off < 3.0 * MILLIMETRE
+    assert told or off < MILLIMETRE * size / 1.7
+
+
+def test_armature_that_only_follows_another_names_the_one_to_pose() -> None:
+    leader, follower = body(), body()
+    leader.name, follower.name = "Leader", "Follower"
+    for bone in follower.pose.bones:
+        own = bone.constraints.new("COPY_TRANSFORMS")
+        own.target, own.subtarget = leader, bone.name
+    bpy.context.view_layer.update()
+    with pytest.raises(RigError, match=r"of 'Follower'\..*Pose 'Leader', whose bones they follow"):
+        PuppetSession(follower, bpy.context.scene, clock=None)
 
 
 def test_escape_gives_the_controls_back() -> None:

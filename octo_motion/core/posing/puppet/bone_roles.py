@@ -84,6 +84,8 @@ class RigFacts:
     """Share of the figure's size: shorter bones follow."""
     goals: frozenset[str] = frozenset()
     """Bones that inverse kinematics reach for or point at: controls, that hang on no limb."""
+    followed: str = ""
+    """Another armature that most of these follow."""
     carried: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """Of bones that something else moves, those that carry them as a parent would."""
     controls: Mapping[str, int] = field(default_factory=dict)
@@ -113,7 +115,9 @@ def find_roles(skeleton: Skeleton, facts: RigFacts, name: str = "The armature") 
         if facts.moved:
             raise RigError(
                 phrase("Constraints or drivers move all limbs of '{name}'.", name=name),
-                "Mute them, or bake the motion to keys.",
+                phrase("Pose '{other}', whose bones they follow.", other=facts.followed)
+                if facts.followed
+                else "Mute them, or bake the motion to keys.",
             )
         raise RigError(
             phrase("'{name}' has no bone that could be posed by hand.", name=name),
