@@ -11,14 +11,13 @@ from typing import Any, Final
 
 import bpy
 
-from ..blender.animation import lasting, writable_armature
+from ..blender.animation import lasting, played_action, writable_armature
 from ..blender.scene import NOTE, ImportedClip, import_clip
 from ..core.errors import ClipError, OctoMotionError, SettingsError
 from ..ui.splicing import (
     ClipReader,
     add_splice,
     name_splice,
-    own_action,
     prepare_splices,
     splicing_settings,
     write_splices,
@@ -159,7 +158,7 @@ def splice(
     set_values(stack, shot.settings)
     if shot.frames is not None or shot.splices is not None:
         # Where none is set, the armature's own action is the base.
-        own = own_action(armature)
+        own = played_action(armature)
         if stack.base is None and own is not None:
             stack.base, stack.base_slot = own
     if shot.frames is not None and stack.base is not None:
@@ -257,12 +256,12 @@ def _armature(name: str) -> bpy.types.Object:
 
 
 def _own_action(source: bpy.types.Object, armature: bpy.types.Object) -> bpy.types.Action:
-    data = source.animation_data
-    if data is None or data.action is None:
+    own = played_action(source)
+    if own is None:
         raise ClipError(f"The source '{source.name}' has no action.", "Name the action.")
     if source == armature:
         raise ClipError(f"'{source.name}' is both base and source.", "Name the source's action.")
-    return data.action
+    return own[0]
 
 
 def files_within(path: Path) -> tuple[Path, ...]:

@@ -26,7 +26,7 @@ from .actions import (
     write_action,
 )
 from .artist_layer import CYCLES, edit_layer, follow, is_layer, lay_edits
-from .clip_sources import actions_for, still_clip
+from .clip_sources import actions_for, own_action, played_action, still_clip, strips_of
 from .clips import (
     clip_channels,
     closes,
@@ -126,10 +126,12 @@ __all__ = [
     "marking_generated",
     "may_replace",
     "note_of",
+    "own_action",
     "play_bones",
     "play_clip",
     "play_layer",
     "play_spliced",
+    "played_action",
     "pose_kept",
     "pose_values",
     "posed_channels",
@@ -151,6 +153,7 @@ __all__ = [
     "slot_of",
     "standing_of",
     "still_clip",
+    "strips_of",
     "time_kept",
     "unedited_with_note",
     "unkeyed_pose",

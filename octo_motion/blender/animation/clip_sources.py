@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import bpy
 import numpy as np
 
@@ -10,6 +12,9 @@ from ...core.rotations import IDENTITY, Floats
 from ...core.splicing.clip import Clip
 from ..rig import armature_data, bone_and_property, read_skeleton, world_matrix
 from .actions import curves_of
+
+_ON_FRAME: Final = 1e-3
+"""Frames by which a strip may begin elsewhere than its action, and still play it as it is."""
 
 
 def still_clip(armature: bpy.types.Object, frames: Floats, rate: float) -> Clip:
@@ -44,3 +49,37 @@ def actions_for(armature: bpy.types.Object) -> list[bpy.types.Action]:
         if moved and 2 * len(moved & bones) > len(moved):
             found.append(action)
     return found
+
+
+def strips_of(armature: bpy.types.Object) -> list[bpy.types.NlaStrip]:
+    """The strips of the NLA that play an action of the armature's, muted ones left out."""
+    data = armature.animation_data
+    if data is None or not data.use_nla:
+        return []
+    return [
+        strip
+        for track in data.nla_tracks
+        for strip in track.strips
+        if not (track.mute or strip.mute) and strip.action is not None
+    ]
+
+
+def own_action(armature: bpy.types.Object) -> tuple[bpy.types.Action, str] | None:
+    """The action of an armature and the identifier of its slot, "" if it has none."""
+    data = armature.animation_data
+    if data is None or data.action is None:
+        return None
+    return data.action, data.action_slot.identifier if data.action_slot else ""
+
+
+def played_action(armature: bpy.types.Object) -> tuple[bpy.types.Action, str] | None:
+    """The same; without an action that of the one NLA strip there is, if it plays it as it is."""
+    own, strips = own_action(armature), strips_of(armature)
+    if own is not None or len(strips) != 1:
+        return own
+    (strip,) = strips
+    assert strip.action is not None
+    moved = abs(strip.frame_start - strip.action_frame_start) > _ON_FRAME
+    if moved or strip.scale != 1.0 or strip.repeat != 1.0 or strip.use_reverse:
+        return None
+    return strip.action, strip.action_slot.identifier if strip.action_slot else ""

@@ -29,7 +29,7 @@ from .properties import (
     splicing_settings,
 )
 from .retargeting import RetargetSession, file_clip
-from .splice_operators import add_splice, name_splice, own_action
+from .splice_operators import add_splice, name_splice
 from .stack import ClipReader, prepare_splices, write_splices
 
 SETTINGS: Final = own_classes(properties)
@@ -71,7 +71,6 @@ __all__ = [
     "draw_in_import_menu",
     "file_clip",
     "name_splice",
-    "own_action",
     "prepare_splices",
     "splicing_settings",
     "write_splices",

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import bpy
 
-from ...blender.animation import StandIn
+from ...blender.animation import StandIn, own_action
 from ...core.errors import ClipError
 from ...core.locomotion.ground import Ground
 from ...core.splicing.clip import Clip
@@ -24,7 +24,6 @@ from .retargeting import (
     previous_result,
     write_retargeted_clip,
 )
-from .splice_operators import own_action
 from .stack import ClipReader, KeptClips, Source, is_source, local_object
 
 _NO_MATTER: Final = frozenset({"live", "live_error"})

@@ -12,7 +12,7 @@ from typing import Any, cast
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, IntProperty, StringProperty
 
-from ...blender.animation import actions_for, writable_armature
+from ...blender.animation import actions_for, played_action, writable_armature
 from ...blender.rig import active_armature
 from ...core.errors import ClipError, OctoMotionError
 from ...core.phrases import phrase
@@ -28,7 +28,7 @@ from .retargeting import (
     file_clip,
     prepare_retarget,
 )
-from .splice_operators import other_armatures, own_action
+from .splice_operators import no_action, other_armatures
 from .stack import ClipReader
 
 
@@ -149,11 +149,10 @@ class OCTO_MOTION_OT_retarget(_RetargetOperator, bpy.types.Operator):
                     "Choose the clip's action.",
                 )
             return [(action, "")]
-        own = own_action(source)
+        own = played_action(source)
         if own is None:
-            raise ClipError(
-                phrase("The source '{source}' has no action.", source=source.name),
-                "Give it one, or choose an action.",
+            raise no_action(
+                source, phrase("The source '{source}' has no action.", source=source.name)
             )
         return [own]
 

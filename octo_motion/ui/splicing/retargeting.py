@@ -22,11 +22,14 @@ from ...blender.animation import (
     is_generated,
     may_replace,
     note_of,
+    own_action,
     play_clip,
     still_clip,
+    strips_of,
     writable_armature,
     write_clip,
 )
+from ...blender.rig import even_scale
 from ...blender.scene import import_clip, read_triangles, remove_clips
 from ...core.errors import ClipError, OctoMotionError, WriteError
 from ...core.locomotion.ground import Ground, sample_ground
@@ -45,7 +48,6 @@ from ...core.steps import finished
 from ..declared_settings import assign
 from .bodies import known_landmarks
 from .properties import splicing_settings, title, write_landmarks
-from .splice_operators import own_action
 from .stack import ClipReader, Source, is_source, local_object
 
 _GROUND_SPACING: Final = 0.02
@@ -153,6 +155,7 @@ def prepare_retarget(
         OctoMotionError: something is wrong that the user can put right.
     """
     writable_armature(armature)
+    even_scale(armature)
     check_source(armature, source)
     reader = reader or ClipReader()
     settings = splicing_settings(armature).retarget
@@ -230,11 +233,17 @@ def _own_motion(armature: bpy.types.Object, reader: ClipReader) -> Source | None
 
 
 def _own_slots(armature: bpy.types.Object) -> set[str]:
-    """Identifiers of slots that are an armature's: that of its name, and that of its action, which
-    files call as they like, unless another armature plays one of that name.
+    """Identifiers of slots that are an armature's: that of its name, those of its NLA strips, and
+    that of its action, which files call as they like, unless another armature plays one of that
+    name.
     """
     found = {f"OB{armature.name}"}
     own = own_action(armature)
+    found |= {
+        strip.action_slot.identifier
+        for strip in strips_of(armature)
+        if strip.action_slot is not None
+    }
     if own is not None and own[1]:
         others = [each for each in bpy.data.objects if each.type == "ARMATURE" and each != armature]
         playing = {played[1] for each in others if (played := own_action(each)) is not None}

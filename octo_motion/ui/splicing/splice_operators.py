@@ -9,7 +9,7 @@ from typing import Any, Final, cast
 import bpy
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
-from ...blender.animation import scene_rate, writable_armature
+from ...blender.animation import played_action, scene_rate, strips_of, writable_armature
 from ...blender.rig import active_armature
 from ...core.errors import ClipError
 from ...core.phrases import joined_phrases, phrase
@@ -41,14 +41,6 @@ from .stack import (
 
 _SPARE_EASE: Final = 0.25
 """Of a clip's length: longer easing would leave little of a short clip."""
-
-
-def own_action(armature: bpy.types.Object) -> tuple[bpy.types.Action, str] | None:
-    """The action of an armature and the identifier of its slot, "" if it has none."""
-    data = armature.animation_data
-    if data is None or data.action is None:
-        return None
-    return data.action, data.action_slot.identifier if data.action_slot else ""
 
 
 def add_splice(
@@ -234,11 +226,10 @@ class OCTO_MOTION_OT_splice_add(StackOperator, bpy.types.Operator):
                     "Choose the clip's action.",
                 )
             return action, ""
-        own = own_action(source)
+        own = played_action(source)
         if own is None:
-            raise ClipError(
-                phrase("The source '{source}' has no action.", source=source.name),
-                "Give it one, or choose an action.",
+            raise no_action(
+                source, phrase("The source '{source}' has no action.", source=source.name)
             )
         if source == armature:
             raise ClipError(
@@ -292,13 +283,25 @@ def other_armatures(context: bpy.types.Context) -> list[bpy.types.Object]:
 def _base(armature: bpy.types.Object, settings: Any) -> tuple[bpy.types.Action, str]:
     if settings.base is not None:
         return settings.base, settings.base_slot
-    own = own_action(armature)
+    own = played_action(armature)
     if own is None:
-        raise ClipError(
-            phrase("'{armature}' has no action to splice onto.", armature=armature.name),
-            "Give it one, or choose the base.",
+        raise no_action(
+            armature, phrase("'{armature}' has no action to splice onto.", armature=armature.name)
         )
     return own
+
+
+def no_action(armature: bpy.types.Object, otherwise: str) -> ClipError:
+    """Why no action of an armature's can be taken: its motion lies in the NLA, or as it is said."""
+    if not strips_of(armature):
+        return ClipError(otherwise, "Give it one, or choose an action.")
+    return ClipError(
+        phrase(
+            "The motion of '{armature}' lies in strips of the NLA.",
+            armature=armature.name,
+        ),
+        "Choose the action of one, or make one of all (Object > Animation > Bake Action).",
+    )
 
 
 # --- Building, and timing that is suggested -------------------------------------------------------

@@ -502,3 +502,80 @@ def test_what_is_stopped_leaves_nothing_behind() -> None:
     steps.close()
     assert (set(bpy.data.objects), set(bpy.data.actions), set(bpy.data.armatures)) == before
     assert hero.animation_data is None or hero.animation_data.action is None
+
+
+def pushed_down(armature: Any, start: float | None = None) -> Any:
+    """Its action as a strip of the NLA."""
+    data = armature.animation_data
+    action, slot = data.action, data.action_slot
+    track = data.nla_tracks.new()
+    strip = track.strips.new(action.name, 1, action)
+    strip.action_slot = slot
+    data.action = None
+    if start is not None:
+        strip.frame_start = start
+    return strip
+
+
+def sitting(armature: Any) -> None:
+    """Move all bones of the rest pose down, so that only the action tells where it stands."""
+    select(armature)
+    bpy.ops.object.mode_set(mode="EDIT")
+    for bone in armature.data.edit_bones:
+        bone.translate(Matrix.Translation((0.0, 0.0, -0.7)).to_translation())
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for frame in (1, 20):
+        for bone in armature.pose.bones:
+            if bone.parent is None:
+                bone.location = (
+                    bone.bone.matrix_local.to_3x3().inverted()
+                    @ Matrix.Translation((0.0, 0.0, 0.7)).to_translation()
+                )
+                bone.keyframe_insert("location", frame=frame)
+            bone.keyframe_insert("rotation_quaternion", frame=frame)
+
+
+@pytest.mark.parametrize("slot", ["Hero", "Of a file"])
+def test_motion_in_the_nla_tells_at_which_height_a_body_stands(slot: str) -> None:
+    """Without it the rest pose did: hips came out 0.7 m lower, and nothing was said."""
+    heights = []
+    for pushed in (False, True):
+        source, hero = walker_and("like it")
+        sitting(hero)
+        hero.animation_data.action_slot.name_display = slot
+        if pushed:
+            pushed_down(hero)
+        select(source, hero)
+        assert OPERATORS.retarget() == {"FINISHED"}
+        heights.append(joint(played(hero, 1), "hips")[:, 2])
+        for each in (source, hero):
+            bpy.data.objects.remove(each)
+        for action in list(bpy.data.actions):
+            bpy.data.actions.remove(action)
+    np.testing.assert_allclose(heights[1], heights[0], atol=1e-4)
+
+
+def test_body_that_is_mirrored_by_its_scale_is_refused() -> None:
+    source, hero = walker_and("like it")
+    walk(hero, BODIES["like it"])
+    hero.scale = (-1.0, 1.0, 1.0)
+    select(source, hero)
+    bpy.context.view_layer.update()
+    before = scene_contents()
+    with pytest.raises(RuntimeError, match="'Hero' is mirrored by a negative scale"):
+        OPERATORS.retarget()
+    assert scene_contents() == before
+
+
+def test_clip_that_lies_in_the_nla_is_taken_from_its_one_strip() -> None:
+    source, hero = walker_and("like it")
+    pushed_down(source)
+    assert OPERATORS.retarget() == {"FINISHED"}
+    assert np.ptp(joint(played(hero, 1), "hips")[:, 1]) > 0.5
+
+
+def test_clip_whose_strip_is_moved_says_that_it_lies_in_the_nla() -> None:
+    source, _ = walker_and("like it")
+    pushed_down(source, 20.0)
+    with pytest.raises(RuntimeError, match=r"'Walker' lies in strips of the NLA.*Choose the act"):
+        OPERATORS.retarget()
