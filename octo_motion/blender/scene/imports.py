@@ -220,6 +220,18 @@ def _import_gltf(path: Path, scene: bpy.types.Scene, up: Up) -> _Result:  # noqa
     return _Result(float(scene.render.fps), None)
 
 
+_REFUSALS: Final = (
+    (
+        "draco",
+        "Its meshes are compressed by Draco, which this Blender cannot read.",
+        "Export it again without compression.",
+    ),
+    ("ascii fbx", "It is no binary FBX file.", "Export it again as binary FBX."),
+    ("missing resource", "", "Put that file beside it, or export one file (.glb)."),
+    ("is not available on this", "", "Export it again without this extension."),
+)
+"""A word of what an importer says, what to say in its place (empty: the same), and what to do."""
+
 _Importer = Callable[[Path, bpy.types.Scene, Up], _Result]
 _IMPORTERS: Final[Mapping[str, _Importer]] = {
     ".bvh": _import_bvh,
@@ -266,10 +278,10 @@ def _call(operator: Any, **options: Any) -> None:
         lines = [line.strip() for line in str(error).splitlines() if line.strip()]
         reason = next((line for line in reversed(lines) if not line.startswith("Location")), "")
         reason = reason.removeprefix("Error: ").rstrip(".") or phrase("it does not say why")
-        raise ClipError(
-            phrase("Blender's importer cannot read it: {reason}.", reason=reason),
-            "Export it again.",
-        ) from error
+        said = str(error).casefold()
+        known = next((each[1:] for each in _REFUSALS if each[0] in said), ("", "Export it again."))
+        problem = known[0] or phrase("Blender's importer cannot read it: {reason}.", reason=reason)
+        raise ClipError(problem, known[1]) from error
     if "FINISHED" not in result:
         raise ClipError("Blender's importer cannot read it.", "Export it again.")
 
@@ -346,6 +358,11 @@ def _motion(
     moving = [
         each for each in actions if any(len(curve.keyframe_points) for curve in curves_of(each))
     ]
+    if not armatures and moving:
+        raise ClipError(
+            "It moves objects, not the bones of an armature.",
+            "Export it with the mesh that the bones deform.",
+        )
     if not armatures:
         raise ClipError("There is no armature in it.", "Choose a file of a character's motion.")
     if not moving:

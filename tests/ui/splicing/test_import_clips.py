@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Importing clips: right speed, one collection, nothing left of files that are refused."""
 
+import json
 import re
+from base64 import b64encode
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -339,7 +341,7 @@ def test_one_damaged_file_stops_none_of_the_others(shared_data: Data, tmp_path: 
     ("name", "content", "message"),
     [
         ("clip.bvh", b"", "'clip.bvh' was not imported. The file is empty"),
-        ("clip.fbx", b"no FBX at all", "'clip.fbx' was not imported. Blender's importer"),
+        ("clip.fbx", b"no FBX at all", "'clip.fbx' was not imported. It is no binary FBX"),
         ("clip.glb", b"glTF but no more", "'clip.glb' was not imported. Blender's importer"),
         ("clip.txt", b"walk", "'.txt' files are no motion"),
         ("clip.bvh", None, "There is no such file"),
@@ -357,6 +359,108 @@ def test_a_file_that_cannot_be_used_changes_nothing(
         bpy.ops.octo_motion.import_clips(filepath=str(tmp_path / name))
 
     assert everything() == before
+
+
+def gltf_of_two_nodes() -> dict[str, Any]:
+    """One node turns the other on; no skin says that they are bones."""
+    seconds = np.array([0.0, 0.5, 1.0], dtype=np.float32).tobytes()
+    turns = np.array([[0, 0, 0, 1], [0.6, 0, 0, 0.8], [0, 0, 0, 1]], dtype=np.float32).tobytes()
+    content = "data:application/octet-stream;base64," + b64encode(seconds + turns).decode()
+    return {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"name": "Hips", "children": [1]}, {"name": "Spine", "translation": [0, 0.3, 0]}],
+        "buffers": [{"uri": content, "byteLength": 60}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": 12},
+            {"buffer": 0, "byteOffset": 12, "byteLength": 48},
+        ],
+        "accessors": [
+            {
+                "bufferView": 0,
+                "componentType": 5126,
+                "count": 3,
+                "type": "SCALAR",
+                "min": [0.0],
+                "max": [1.0],
+            },
+            {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC4"},
+        ],
+        "animations": [
+            {
+                "channels": [{"sampler": 0, "target": {"node": 1, "path": "rotation"}}],
+                "samplers": [{"input": 0, "output": 1}],
+            }
+        ],
+    }
+
+
+def without_skin() -> str:
+    return json.dumps(gltf_of_two_nodes())
+
+
+def compressed() -> str:
+    content = gltf_of_two_nodes()
+    name = "KHR_draco_mesh_compression"
+    content["extensionsUsed"] = content["extensionsRequired"] = [name]
+    place = {"type": "VEC3", "min": [0.0, 0.0, 0.0], "max": [1.0, 1.0, 1.0]}
+    content["accessors"].append({"componentType": 5126, "count": 3, **place})
+    content["accessors"].append({"componentType": 5123, "count": 3, "type": "SCALAR"})
+    content["bufferViews"].append({"buffer": 0, "byteOffset": 0, "byteLength": 60})
+    packed = {name: {"bufferView": 2, "attributes": {"POSITION": 0}}}
+    mesh = {"attributes": {"POSITION": 2}, "indices": 3, "extensions": packed}
+    content["meshes"] = [{"primitives": [mesh]}]
+    content["nodes"].append({"mesh": 0})
+    content["scenes"][0]["nodes"].append(2)
+    return json.dumps(content)
+
+
+def without_its_buffer() -> str:
+    content = gltf_of_two_nodes()
+    content["buffers"][0]["uri"] = "missing.bin"
+    return json.dumps(content)
+
+
+def of_a_strange_extension() -> str:
+    content = gltf_of_two_nodes()
+    content["extensionsUsed"] = content["extensionsRequired"] = ["KHR_not_known"]
+    return json.dumps(content)
+
+
+def in_text_form() -> str:
+    return "; FBX 7.4.0 project file\nFBXHeaderExtension:  {\n}\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.gltf", without_skin, r"not the bones of an armature\. Export it with the mesh"),
+        ("a.gltf", without_its_buffer, r"'missing\.bin'\. Put that file beside it"),
+        ("a.gltf", of_a_strange_extension, r"KHR_not_known .* without this extension"),
+        ("a.fbx", in_text_form, r"no binary FBX file\. Export it again as binary FBX"),
+    ],
+)
+def test_what_to_export_otherwise_is_said_of_a_file_that_cannot_be_used(
+    name: str, content: Callable[[], str], message: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(content(), encoding="utf-8")
+    before = everything()
+    with pytest.raises(ClipError) as error:
+        import_clip(tmp_path / name, bpy.context)
+    assert re.search(message, str(error.value))
+    assert "/" not in str(error.value)
+    assert everything() == before
+
+
+def test_meshes_that_are_compressed_are_read_or_named(tmp_path: Path) -> None:
+    """A path of this Blender's own library was all that was said; others have it, and go on."""
+    path = tmp_path / "a.gltf"
+    path.write_text(compressed(), encoding="utf-8")
+    with pytest.raises(ClipError) as error:
+        import_clip(path, bpy.context)
+    assert re.search("compressed by Draco|cannot read it|moves objects", str(error.value))
+    assert ".so" not in str(error.value)
 
 
 def test_a_rig_without_motion_is_refused_and_leaves_nothing(shared_data: Data) -> None:
