@@ -346,6 +346,7 @@ CHANGES: dict[str, Callable[[Played, Path], Copy]] = {
     "way on the object": _with(carried_by_object),
     "before 0": _at(-20.0),
     "on half frames": _at(1000.5),
+    "between frames": _at(0.37),
     "fps": _at(0.0, 2.0),
     "glb": _exported("glb"),
     "fbx": _exported("fbx"),
