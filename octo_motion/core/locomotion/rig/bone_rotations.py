@@ -148,9 +148,17 @@ def _sucker_sides(skeleton: Skeleton, bones: Sequence[str], down: Floats) -> Flo
             looking[place] = axis
     along = np.sum(looking * rest.segments, axis=-1, keepdims=True)
     across = looking - along * rest.segments
-    # A bone that hangs straight down at rest has no side that looks down: it follows its parent.
     size = np.linalg.norm(across, axis=-1, keepdims=True)
-    return np.where(size > _NO_SIDE, across / np.maximum(size, _NO_SIDE), 0.0)
+    sides = np.where(size > _NO_SIDE, across / np.maximum(size, _NO_SIDE), 0.0)
+    # A bone that hangs straight down at rest has no side that looks down: it has that of the bone
+    # before, which is turned to it on the shortest way.
+    for bone in range(1, len(sides)):
+        if rest.follows[bone] and not sides[bone].any() and sides[bone - 1].any():
+            back = conjugate(rest.carried[bone])
+            before = rotate(back, rest.segments[bone - 1])
+            turn = shortest_arc(before, rest.segments[bone])
+            sides[bone] = rotate(turn, rotate(back, sides[bone - 1]))
+    return sides
 
 
 def rotate_bones(
