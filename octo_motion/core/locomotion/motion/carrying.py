@@ -11,7 +11,7 @@ import numpy as np
 
 from ...rotations import IDENTITY, Floats, multiply, normalized, rotate, shortest_arc, slerp
 from ...smoothing import smooth_step
-from ..ground import Carpet, Unrolled, turn_between
+from ..ground import Carpet, Ground, Unrolled, turn_between
 from ..rig import ArmFrames, ArmMotion, BodyFrame
 
 _ATTACHED: Final = 0.4
@@ -24,6 +24,8 @@ _NEAR: Final = 0.25
 """Arm lengths about a joint in which ground that moves is looked at for how it turns …"""
 _WIDE: Final = 0.5
 """… and about the body, which rides on all of it."""
+_AIR: Final = (0.12, 0.45)
+"""Arm lengths above the ground up to which an arm lies there, and from which on it does not."""
 _CROSS: Final = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [0.0, 0.0]])
 
 
@@ -78,8 +80,75 @@ class Carry:
         return self.unrolled.to_world(points, along), self.unrolled.turns_at(points, along)
 
 
+@dataclass(frozen=True, eq=False)
+class Laid:
+    """What lays a motion in place, planned on level ground, onto the ground that is there."""
+
+    ground: Ground
+    felt: Ground
+    """The same with its edges rounded off, as arms feel it."""
+    level: float
+    """Height that the plan's ground has."""
+    reach: float
+    """Metres that arms are long."""
+    lean: float
+    """Share by which the body leans with the ground."""
+    body_stays: bool
+    """Whether nothing moves the body."""
+
+    def places(
+        self,
+        points: Floats,
+        distance: Floats,  # noqa: ARG002 - as those that travel
+        frames: Floats | None = None,  # noqa: ARG002
+        *,
+        wide: bool = False,
+    ) -> tuple[Floats, Floats]:
+        """Where points (moments, …, 3) come to lie, and turns (moments, …, 4) that lead there: as
+        high above the ground as they were above the level one, and turned as it is about them.
+        """
+        if wide and self.body_stays:
+            return points, np.broadcast_to(IDENTITY, (*points.shape[:-1], 4))
+        flat = points.reshape(-1, 3)
+        at = (points if wide else self._anchors(points)).reshape(-1, 3)
+        size = (_WIDE if wide else _NEAR) * self.reach
+        before = np.empty((len(flat), len(_CROSS), 3))
+        before[..., :2] = at[:, None, :2] + size * _CROSS
+        before[..., 2] = self.level
+        after = before.copy()
+        after[..., 2] = self.felt.height(before[..., :2].reshape(-1, 2)).reshape(len(flat), -1)
+        turn = turn_between(before[:, :4], after[:, :4])
+        start, end = (each.mean(axis=1) if wide else each[:, 4] for each in (before, after))
+        if wide:
+            turn = slerp(np.broadcast_to(IDENTITY, turn.shape), turn, np.full(len(turn), self.lean))
+        there = end + rotate(turn, flat - start)
+        return there.reshape(points.shape), turn.reshape(*points.shape[:-1], 4)
+
+    def on_ground(self, joints: Floats) -> Floats:
+        """(moments, joints) how far each of an arm's joints (moments, joints, 3) goes with the
+        ground: those that lead to where it lies, and those beyond. One in the air is the body's.
+        """
+        return np.broadcast_to(self._lies(joints).max(axis=1, keepdims=True), joints.shape[:-1])
+
+    def _lies(self, joints: Floats) -> Floats:
+        heights = (joints[..., 2] - self.level) / self.reach
+        return smooth_step((_AIR[1] - heights) / (_AIR[1] - _AIR[0]))
+
+    def _anchors(self, joints: Floats) -> Floats:
+        """By which ground each of an arm's joints (moments, joints, 3) is laid: what lies, or leads
+        there, by that below it; what is in the air beyond by that of what lies before it, so that
+        its shape stays.
+        """
+        lies, result = self._lies(joints)[..., None], joints.copy()
+        own = 1.0 - np.maximum.accumulate(lies, axis=1) * (1.0 - lies)
+        for joint in range(1, joints.shape[1]):
+            before = result[:, joint - 1]
+            result[:, joint] = before + own[:, joint] * (joints[:, joint] - before)
+        return result
+
+
 def carried(  # noqa: PLR0917 - what is carried, where it is, and when
-    carry: Carry,
+    carry: Carry | Laid,
     frames: Sequence[ArmFrames],
     arms: ArmMotion,
     going: tuple[Floats, Floats],
@@ -122,6 +191,8 @@ def carried(  # noqa: PLR0917 - what is carried, where it is, and when
         there, turns = carry.places(joints, distance, at)
         with_body = place[:, None] + rotate(turn[:, None], joints - centre[:, None])
         share = smooth_step(arm.reach / (_ATTACHED * arm.length))[None]
+        if isinstance(carry, Laid):
+            share = share * carry.on_ground(joints)
         there = with_body + share[..., None] * (there - with_body)
         with_turn = np.broadcast_to(turn[:, None], turns.shape)
         turns = slerp(with_turn, turns, np.broadcast_to(share, turns.shape[:2]))

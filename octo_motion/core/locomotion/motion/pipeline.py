@@ -42,7 +42,7 @@ from ..rig import (
     turns_in_world,
     where_it_helps,
 )
-from .carrying import Carry, carried
+from .carrying import Carry, Laid, carried
 from .few_keys import Motion, measuring_keyed, reduced
 from .handover import (
     ArmsAround,
@@ -334,6 +334,10 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     made = yield from segments.compute(travel, body.places, step, frames_per_metre, cyclic=cyclic)
     # Each of these takes a while; who works in turns looks about in between.
     yield 0.9
+    if plan.laid is not None:
+        # From here on it plays where it is, on what is there.
+        at = travel.distance, times
+        going = keyed = _carried(plan, plan.laid, made.arms, keyed, at)
     arms = yield from scaled(_clearing(plan, made, going, cyclic=cyclic), 0.9, 0.9)
     yield 0.93
     swimming = segments.swimming(travel.distance)
@@ -398,7 +402,7 @@ def _hand_over(plan: MotionPlan, posed: _Posed) -> None:
 
 def _carried(
     plan: MotionPlan,
-    carry: Carry,
+    carry: Carry | Laid,
     arms: ArmMotion,
     going: Travelled,
     come: tuple[Floats, Floats],
@@ -543,11 +547,15 @@ def _stays(plan: MotionPlan, going: Travelled, offset: Floats | None) -> Travell
 
 def _ground(plan: MotionPlan) -> Ground | None:
     """What the arms stand on, where they do."""
+    if plan.laid is not None:
+        return plan.laid.ground
     return plan.standing[0].ground if plan.standing else None
 
 
 def _underfoot(plan: MotionPlan) -> Ground | None:
     """The same as they feel it."""
+    if plan.laid is not None:
+        return plan.laid.felt
     return plan.standing[0].underfoot if plan.standing else None
 
 
@@ -767,8 +775,10 @@ def _measuring(
     yield
     poses = Poses(arms.rotations, arms.strains, *going)
     below = plan.standing[0].job if plan.standing else job.floor
-    ground = _ground(plan)
-    floor = _floor_under(job, keyed, plan.first.poser.arm_length * creature.scale)
+    ground, stays, floor = _ground(plan), None, None
+    if plan.laid is None:
+        stays = keyed if job.in_place else None
+        floor = _floor_under(job, keyed, plan.first.poser.arm_length * creature.scale)
     yield
     # Between frames it matters what is below.
     nowhere = ground is None and floor is None
@@ -787,7 +797,7 @@ def _measuring(
         halfway=None if nowhere else halfway_automatic(poses, cyclic=job.repeats),
         skins=below.skins if below is not None else None,
         rate=job.timing.rate,
-        stays=keyed if job.in_place else None,
+        stays=stays,
         floor=floor,
         turning=None if turning is None else turning[:: plan.stride],
     )

@@ -34,6 +34,7 @@ from ..ground import (
     HeightField,
     Unrolled,
     roll_out,
+    sample_ground,
 )
 from ..path import (
     Course,
@@ -66,7 +67,7 @@ from ..rig import (
     object_transforms,
     stretch_mantle,
 )
-from .carrying import Carry
+from .carrying import Carry, Laid
 from .job import (
     BodyJob,
     ChangesByHeight,
@@ -77,7 +78,16 @@ from .job import (
     Timing,
     Tolerances,
 )
-from .segments import Gait, Nearby, Segments, Standing, Transitions, standing_on
+from .segments import (
+    EDGE,
+    FINE,
+    Gait,
+    Nearby,
+    Segments,
+    Standing,
+    Transitions,
+    standing_on,
+)
 
 _posers: Final[ContentCache[GaitPoser]] = ContentCache(12)
 
@@ -215,6 +225,9 @@ class MotionPlan:
     """What it does as it stops on its way; none where it never stops."""
     warnings: tuple[str, ...]
     carry: Carry | None = None
+    laid: Laid | None = None
+    """Onto what a motion in place is laid, none where it stays on level ground.
+    """
     """What takes the motion from the plan to the world; none where they are the same."""
 
     @property
@@ -392,6 +405,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         stalking=stalking,
         warnings=tuple(warnings),
         carry=_along(job, carry, faces, standing),
+        laid=_laid_on(job, standing),
     )
     yield 1.0
     return plan
@@ -438,6 +452,35 @@ def plan_near(
     segments = Segments([moving], [walk], None, bones, when.route)
     yield 1.0
     return replace(plan, segments=segments), moments
+
+
+def _laid_on(job: MotionJob, standing: Standing | None) -> Laid | None:
+    """The mesh that lies about a body that stands in place; none where there is none, or where the
+    body is to stand otherwise.
+    """
+    creature, floor, ground = job.creature, job.floor, job.ground
+    if not job.in_place or floor is None or ground is None or standing is None:
+        return None
+    world, up = creature.world, creature.body.rotation[:, 2]
+    upright = (world[:3, :3] @ up)[2] > _UPRIGHT * creature.scale
+    if job.begin is not None or job.end is not None or not upright:
+        return None
+    reach, place = reach_of(creature), world[:3, 3]
+    sampled = sample_ground(
+        floor.triangles,
+        place[None],
+        np.zeros(1, dtype=bool),
+        reach=_ABOUT * reach,
+        spacing=FINE * reach,
+        headroom=reach,
+        content=floor.content,
+        bare=float(place[2]),
+    )
+    if abs(float(sampled.height(place[None, :2])[0] - place[2])) > _ON_GROUND * reach:
+        return None
+    stays = not creature.root_bone
+    felt = sampled.rounded(EDGE * reach)
+    return Laid(sampled, felt, float(place[2]), reach, ground.stance.lean, stays)
 
 
 def _along(
@@ -704,6 +747,13 @@ def _self_motion(
     )
 
 
+_UPRIGHT: Final = float(np.cos(np.radians(1.0)))
+"""Cosine of how far the up of a body in place may be off the vertical, and it is laid on a mesh:
+else the artist has laid it somehow."""
+_ABOUT: Final = 1.8
+"""Arm lengths to all sides up to which that mesh is looked at."""
+_ON_GROUND: Final = 0.5
+"""Arm lengths from it up to which a body stands on it, and not above or below."""
 _CROUCHED: Final = 0.05
 """Arm lengths by which a body that stalks crouches at its stops …"""
 _ABOVE: Final = 0.5

@@ -71,11 +71,11 @@ from ..path import (
 from ..rig import ArmMotion
 from .job import Creature, GroundJob
 
-_FINE: Final = 0.03
+FINE: Final = 0.03
 """Arm lengths between the samples of a ground …"""
 _COARSE: Final = 0.1
 """… and of one that only follows the route."""
-_EDGE: Final = 1.0 / 6.0
+EDGE: Final = 1.0 / 6.0
 """Arm lengths: radius with which arms feel an edge. At 1/8 skin of Walk is 0.5 % of an arm in
 stairs instead of 0.3 %, without it 2.9 %."""
 _AROUND: Final = 1.8
@@ -384,7 +384,7 @@ def _finding_ground(
         return (ground, ground), warnings
     inside = (distance >= 0.0) & (distance <= route.length)
     mesh = job.mesh
-    sizes = {"reach": _AROUND * reach, "spacing": _FINE * reach, "headroom": _HEADROOM * reach}
+    sizes = {"reach": _AROUND * reach, "spacing": FINE * reach, "headroom": _HEADROOM * reach}
     sizes["gap"] = _GAP * reach
     key = content_key(mesh.content, path, inside, sizes)
     if (found := _grounds.known(key)) is None:
@@ -393,7 +393,7 @@ def _finding_ground(
         sampling = sampling_ground(triangles, path, inside, **sizes, content=mesh.content)
         sampled = yield from evenly(sampling, 0.3)
         yield 0.4
-        made = sampled, sampled.rounded(_EDGE * reach)
+        made = sampled, sampled.rounded(EDGE * reach)
         found = _grounds.get(key, lambda: made)
         yield 0.5
     told = _too_steep(found[0], path[inside], reach) if job.stance.up == "WORLD" else ()

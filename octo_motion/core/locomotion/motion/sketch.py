@@ -99,6 +99,7 @@ class Sketch:
         return (
             plan.segments.transitions is None
             and plan.carry is None
+            and plan.laid is None
             and _is_simple(known)
             and _is_simple(job)
             and job.in_place == known.in_place
