@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the panel tells is what one sees, as the referee does, who knows nothing of the add-on."""
 
+from collections.abc import Callable
 from typing import Any
 
 import bpy
@@ -44,13 +45,21 @@ def test_the_panel_and_the_referee_agree(name: str, add_on: Any) -> None:  # noq
         assert told["DEPTH"].value > 0.2
 
 
-@pytest.mark.parametrize(("name", "ground"), [("swim", "plane"), ("idle", "slope")])
+def stepping(settings: Any) -> None:
+    # Under who steps in place the ground goes by, and is level.
+    settings.table.stride = 0.06
+
+
+@pytest.mark.parametrize(
+    ("name", "ground", "change"), [("swim", "plane", None), ("idle", "slope", stepping)]
+)
 def test_arms_in_a_ground_that_nothing_holds_are_told(
     name: str,
     ground: str,
+    change: Callable[[Any], None] | None,
     add_on: Any,  # noqa: ARG001
 ) -> None:
-    scene = build(name, ground)
+    scene = build(name, ground, change=change)
     told = {each.kind: each for each in scene.armature.octo_motion.locomotion.figures}
     played = record(scene.armature, moments(scene.start, scene.end))
     length, surface = referee.arm_length(played, scene.arms), Surface.of(scene.ground)

@@ -82,7 +82,7 @@ class Carry:
 
 @dataclass(frozen=True, eq=False)
 class Laid:
-    """What lays a motion in place, planned on level ground, onto the ground that is there."""
+    """What lays a body that rests, planned on level ground, onto the ground that is there."""
 
     ground: Ground
     felt: Ground

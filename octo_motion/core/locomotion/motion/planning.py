@@ -226,8 +226,7 @@ class MotionPlan:
     warnings: tuple[str, ...]
     carry: Carry | None = None
     laid: Laid | None = None
-    """Onto what a motion in place is laid, none where it stays on level ground.
-    """
+    """Onto what a body that rests in place is laid; none where it stays on level ground."""
     """What takes the motion from the plan to the world; none where they are the same."""
 
     @property
@@ -455,11 +454,13 @@ def plan_near(
 
 
 def _laid_on(job: MotionJob, standing: Standing | None) -> Laid | None:
-    """The mesh that lies about a body that stands in place; none where there is none, or where the
-    body is to stand otherwise.
+    """The mesh that lies about a body that rests in place; none where there is none, or where it is
+    to stand otherwise.
     """
     creature, floor, ground = job.creature, job.floor, job.ground
     if not job.in_place or floor is None or ground is None or standing is None:
+        return None
+    if job.gaits[0].travel.stride > _RESTING:
         return None
     world, up = creature.world, creature.body.rotation[:, 2]
     upright = (world[:3, :3] @ up)[2] > _UPRIGHT * creature.scale
@@ -478,9 +479,12 @@ def _laid_on(job: MotionJob, standing: Standing | None) -> Laid | None:
     )
     if abs(float(sampled.height(place[None, :2])[0] - place[2])) > _ON_GROUND * reach:
         return None
-    stays = not creature.root_bone
+    stays, level = not creature.root_bone, float(place[2])
+    if stays:
+        # Nothing lifts the body to its height: level ground is as far below it as that asks for.
+        level -= float(standing.line.clearances[0] - creature.scale * creature.body.center @ up)
     felt = sampled.rounded(EDGE * reach)
-    return Laid(sampled, felt, float(place[2]), reach, ground.stance.lean, stays)
+    return Laid(sampled, felt, level, reach, ground.stance.lean, stays)
 
 
 def _along(
@@ -750,6 +754,9 @@ def _self_motion(
 _UPRIGHT: Final = float(np.cos(np.radians(1.0)))
 """Cosine of how far the up of a body in place may be off the vertical, and it is laid on a mesh:
 else the artist has laid it somehow."""
+_RESTING: Final = 0.05
+"""Arm lengths of a stride up to which a body in place rests: under one that walks there the ground
+goes by, and is level."""
 _ABOUT: Final = 1.8
 """Arm lengths to all sides up to which that mesh is looked at."""
 _ON_GROUND: Final = 0.5
