@@ -225,9 +225,9 @@ class MotionPlan:
     """What it does as it stops on its way; none where it never stops."""
     warnings: tuple[str, ...]
     carry: Carry | None = None
+    """What takes the motion from the plan to the world; none where they are the same."""
     laid: Laid | None = None
     """Onto what a body that rests in place is laid; none where it stays on level ground."""
-    """What takes the motion from the plan to the world; none where they are the same."""
 
     @property
     def first(self) -> Gait:
