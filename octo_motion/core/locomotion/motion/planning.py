@@ -92,6 +92,7 @@ from .segments import (
 _posers: Final[ContentCache[GaitPoser]] = ContentCache(12)
 
 _unrolled_known: Final[ContentCache[tuple[Unrolled, Floats, np.ndarray] | None]] = ContentCache(2)
+_floors: Final[ContentCache[tuple[HeightField, HeightField]]] = ContentCache(2)
 _frames_known: Final[ContentCache[list[ArmFrames]]] = ContentCache(4)
 
 
@@ -467,23 +468,27 @@ def _laid_on(job: MotionJob, standing: Standing | None) -> Laid | None:
     if job.begin is not None or job.end is not None or not upright:
         return None
     reach, place = reach_of(creature), world[:3, 3]
-    sampled = sample_ground(
-        floor.triangles,
-        place[None],
-        np.zeros(1, dtype=bool),
-        reach=_ABOUT * reach,
-        spacing=FINE * reach,
-        headroom=reach,
-        content=floor.content,
-        bare=float(place[2]),
-    )
+
+    def about() -> tuple[HeightField, HeightField]:
+        sampled = sample_ground(
+            floor.triangles,
+            place[None],
+            np.zeros(1, dtype=bool),
+            reach=_ABOUT * reach,
+            spacing=FINE * reach,
+            headroom=reach,
+            content=floor.content,
+            bare=float(place[2]),
+        )
+        return sampled, sampled.rounded(EDGE * reach)
+
+    sampled, felt = _floors.get(content_key(floor.content, place, reach), about)
     if abs(float(sampled.height(place[None, :2])[0] - place[2])) > _ON_GROUND * reach:
         return None
     stays, level = not creature.root_bone, float(place[2])
     if stays:
         # Nothing lifts the body to its height: level ground is as far below it as that asks for.
         level -= float(standing.line.clearances[0] - creature.scale * creature.body.center @ up)
-    felt = sampled.rounded(EDGE * reach)
     return Laid(sampled, felt, level, reach, ground.stance.lean, stays)
 
 
