@@ -4,6 +4,7 @@
 Blender as a module runs no timers: what a timer would do is called by hand.
 """
 
+import gc
 import subprocess
 import sys
 import time
@@ -100,6 +101,22 @@ def test_the_motion_follows_a_point_of_the_route(octopus: Any) -> None:
     followed = motion(octopus)
     generate(octopus)
     assert motion(octopus) == followed  # as Generate makes it
+
+
+def test_pythons_collector_leaves_alone_what_is_there_while_anything_is_live(octopus: Any) -> None:
+    """It looked through all of Blender's scripts in the middle of a drag, for 60 ms."""
+    assert gc.get_freeze_count() > 10_000
+    drag_route(octopus)
+    assert settle()
+    before = gc.get_freeze_count()
+    bpy.ops.ed.undo_push(message="Before")
+    drag_route(octopus)
+    settle()
+    assert gc.get_freeze_count() <= before  # once, not for each change: only what is gone is less
+    settings_of(octopus).live = False
+    settle()
+    live._state.end_watching()
+    assert gc.get_freeze_count() == 0
 
 
 def test_another_set_up_is_followed_and_live_stays_on(octopus: Any) -> None:
