@@ -151,8 +151,10 @@ def on_a_root(person: Played) -> Played:
     )
 
 
-def build(person: Played, name: str, modes: tuple[str, ...] = ("QUATERNION",)) -> Any:
-    """An armature with an action in the scene."""
+def build(
+    person: Played, name: str, modes: tuple[str, ...] = ("QUATERNION",), *, alone: bool = False
+) -> Any:
+    """An armature with an action in the scene; ``alone``, every second bone turns by itself."""
     scene: Any = bpy.context.scene
     made: Any = bpy.data.objects.new(name, bpy.data.armatures.new(name))
     scene.collection.objects.link(made)
@@ -167,6 +169,7 @@ def build(person: Played, name: str, modes: tuple[str, ...] = ("QUATERNION",)) -
         each.matrix = Matrix(person.rest[bone].tolist())
         if parent >= 0:
             each.parent = bones[person.names[parent]]
+            each.use_inherit_rotation = not (alone and bone % 2)
     bpy.ops.object.mode_set(mode="OBJECT")
     # What Blender made of it, to the last digit.
     rest = np.array([np.array(made.data.bones[each].matrix_local) for each in person.names])
@@ -178,13 +181,33 @@ def build(person: Played, name: str, modes: tuple[str, ...] = ("QUATERNION",)) -
             rests = _inverse(rest[parent]) @ rests
         pose_bone = made.pose.bones[person.names[bone]]
         pose_bone.rotation_mode = modes[bone % len(modes)]
-        keys |= _keys(pose_bone.path_from_id(), pose_bone.rotation_mode, _inverse(rests) @ own)
+        moved = _inverse(rests) @ own
+        if not pose_bone.bone.use_inherit_rotation:
+            moved = _turned_alone(pose_bone, person.poses[:, bone], person.poses[:, parent])
+        keys |= _keys(pose_bone.path_from_id(), pose_bone.rotation_mode, moved)
     made.rotation_mode = "QUATERNION"
     if np.ptp(person.world, axis=0).max() > 0.0:
         keys |= _keys("", "QUATERNION", person.world)
     made.matrix_world = Matrix(person.world[0].tolist())
     _key(made, person.frames, keys)
     return made
+
+
+def _turned_alone(bone: Any, poses: Floats, carriers: Floats) -> Floats:
+    """What moves a bone (frames, 4, 4) that does not turn with its parent, as Blender has it."""
+    own = bone.bone
+    return np.array(
+        [
+            own.convert_local_to_pose(
+                Matrix(pose.tolist()),
+                own.matrix_local,
+                parent_matrix=Matrix(carrier.tolist()),
+                parent_matrix_local=own.parent.matrix_local,
+                invert=True,
+            )
+            for pose, carrier in zip(poses, carriers, strict=True)
+        ]
+    )
 
 
 def _keys(path: str, mode: Any, matrices: Floats) -> dict[str, Floats]:
@@ -338,6 +361,7 @@ CHANGES: dict[str, Callable[[Played, Path], Copy]] = {
     "another rest pose": _with(_rested(5)),
     "bone axes": _with(_axes),
     "rotation modes": _with(lambda person: person, modes=MODES),
+    "turns by itself": _with(lambda person: person, alone=True),
     "centimetres": _with(lambda person: in_units(person, _scaled(100.0) @ _turned(-90.0, "X"))),
     "hundredfold": _placed(_scaled(100.0)),
     "a hundredth": _placed(_scaled(0.01)),

@@ -250,6 +250,7 @@ def clip_channels(
     armature: bpy.types.Object, clip: Clip, posed: PoseValues | None = None
 ) -> Generator[None, None, list[Channel]]:
     """Channels of all bones of a clip and of the object, in steps; see :func:`bone_channels`."""
+    clip = clip.on_bones(read_skeleton(armature).inherits_rotation)
     channels = yield from bone_channels(armature, clip, clip.skeleton.names, posed)
     return channels + _object_channels(armature, clip)
 

@@ -163,11 +163,13 @@ def prepare_retarget(
     base = _own_motion(armature, own or reader) or _resting(armature)
     for each in (base, clip):
         _check_landmarks(each)
+    # All bones get keys: which of them turn with their parents changes nothing but these.
+    base, clip = (replace(each, clip=each.clip.inheriting) for each in (base, clip))
     goal = cast("LimbGoal", settings.mode.lower())
     return RetargetJob(
         armature.name,
         base,
-        still_clip(armature, clip.clip.frames, clip.clip.rate),
+        still_clip(armature, clip.clip.frames, clip.clip.rate).inheriting,
         clip,
         WholeBody(goal, travel=settings.travel, foot_lock=settings.foot_lock),
         _triangles(settings),

@@ -500,7 +500,8 @@ def _splice(reader: ClipReader, item: Any, base: Source) -> Splice:
     part = _part(item, base, source)
     splice = Splice(
         part=part,
-        clip=source.clip,
+        # Of another body, which of its bones turn with their parents tells nothing.
+        clip=source.clip if source.armature == base.armature else source.clip.inheriting,
         timing=timing,
         landmarks=source.landmarks,
         goal=cast("LimbGoal", item.mode.lower()),

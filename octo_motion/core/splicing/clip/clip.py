@@ -86,6 +86,20 @@ class Clip:
         shift = self.world[:, None, :3, 3]
         return multiply(turn, orientations), shift + self.scale * rotate(turn, heads)
 
+    @property
+    def inheriting(self) -> Clip:
+        """The same motion of bones that all turn with their parents."""
+        return self.on_bones((True,) * len(self.skeleton))
+
+    def on_bones(self, inherits: tuple[bool, ...]) -> Clip:
+        """The same motion of bones that turn with their parents or not (bones,)."""
+        if inherits == self.skeleton.inherits_rotation:
+            return self
+        skeleton = replace(self.skeleton, inherits_rotation=inherits)
+        posed = self.skeleton.pose(self.rotations, self.locations)
+        rotations, locations = unposed(skeleton, *posed)
+        return replace(self, skeleton=skeleton, rotations=rotations, locations=locations)
+
     def taken(self, rows: ArrayLike) -> Clip:
         """Some of its frames alone, by number from 0, ascending."""
         chosen = np.asarray(rows, dtype=np.intp)
