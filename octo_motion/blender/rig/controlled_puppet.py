@@ -226,10 +226,8 @@ class ControlledPuppet(Puppet):
         assert armature.pose is not None
         bones, now = armature.pose.bones, self._points.shown(armature).reshape(-1, 3) * self._size
         for reach, joints in self._reaches:
-            before, after = (
-                self._start[joints] * self._size,
-                goal.reshape(-1, 3)[joints] * self._size,
-            )
+            before = self._start[joints] * self._size
+            after = goal.reshape(-1, 3)[joints] * self._size
             off = np.linalg.norm(after - now[joints], axis=1).max()
             if np.abs(after - before).max() <= _MOVED * self._size or off < _FAR * self._size:
                 continue
@@ -254,11 +252,8 @@ class ControlledPuppet(Puppet):
         assert shown.pose is not None
         bones, world = shown.pose.bones, shown.matrix_world
         points = self._start[: 2 * len(self.figure)] * self._size
-        self._leading |= {
-            name
-            for name in spline_leads(armature) & set(self._limbs)
-            if self._trunk not in self._limbs[name]
-        }
+        bending = spline_leads(armature) & self._limbs.keys()
+        self._leading |= {each for each in bending if self._trunk not in self._limbs[each]}
         led_bodies: list[tuple[int, int]] = []
         self._reaches: list[tuple[Reach, list[int]]] = []
         self._poles: dict[str, Floats] = {}

@@ -73,6 +73,12 @@ class Carry:
         )
         return end + rotate(turn, there - start), multiply(turn, turns)
 
+    def on_ground(self, joints: Floats) -> Floats:
+        """(moments, joints) how far each of an arm's joints (moments, joints, 3) goes with the
+        ground: all of a body that travels do.
+        """
+        return np.ones(joints.shape[:-1])
+
     def _up(self, points: Floats, along: Floats) -> tuple[Floats, Floats]:
         """Where points (…, 3) of the plan are before the ground moves, and turns (…, 4)."""
         if self.unrolled is None:
@@ -190,9 +196,7 @@ def carried(  # noqa: PLR0917 - what is carried, where it is, and when
         joints = np.concatenate([root[:, None], root[:, None] + steps], axis=1)
         there, turns = carry.places(joints, distance, at)
         with_body = place[:, None] + rotate(turn[:, None], joints - centre[:, None])
-        share = smooth_step(arm.reach / (_ATTACHED * arm.length))[None]
-        if isinstance(carry, Laid):
-            share = share * carry.on_ground(joints)
+        share = smooth_step(arm.reach / (_ATTACHED * arm.length)) * carry.on_ground(joints)
         there = with_body + share[..., None] * (there - with_body)
         with_turn = np.broadcast_to(turn[:, None], turns.shape)
         turns = slerp(with_turn, turns, np.broadcast_to(share, turns.shape[:2]))

@@ -390,7 +390,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     creature, pushed = job.creature, _surge(job, segments, route)
     stalking = _stalking(job, when, segments)
     yield 0.9
-    plan = MotionPlan(
+    return MotionPlan(
         job=job,
         segments=segments,
         schedule=when,
@@ -407,8 +407,6 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         carry=_along(job, carry, faces, standing),
         laid=_laid_on(job, standing),
     )
-    yield 1.0
-    return plan
 
 
 def _lowest(route: Route) -> float:
