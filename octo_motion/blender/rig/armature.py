@@ -177,6 +177,11 @@ def deformed_meshes(armature: bpy.types.Object) -> list[bpy.types.Object]:
     ]
 
 
+def acts(constraint: bpy.types.Constraint) -> bool:
+    """Whether a constraint does anything at present."""
+    return not constraint.mute and constraint.influence > 0.0
+
+
 def even_scale(armature: bpy.types.Object) -> float:
     """The scale of an object, which must be the same in all directions.
 
@@ -229,9 +234,7 @@ def _driven_bones(armature: bpy.types.Object) -> set[str]:
     if armature.pose is None:
         return set()
     names = {
-        bone.name
-        for bone in armature.pose.bones
-        if any(not constraint.mute and constraint.influence > 0 for constraint in bone.constraints)
+        bone.name for bone in armature.pose.bones if any(acts(each) for each in bone.constraints)
     }
     transforms = ("location", "rotation_", "scale")
     return names | {

@@ -17,7 +17,7 @@ import numpy as np
 from mathutils import Quaternion, Vector
 
 from ...core.rotations import Floats, angle_between, conjugate, multiply
-from .armature import armature_data, driven_channels, set_rotation
+from .armature import acts, armature_data, driven_channels, set_rotation
 
 _MECHANISM: Final = re.compile(r"(DEF|ORG|MCH|VIS)-", re.IGNORECASE)
 """Names of bones that are no controls."""
@@ -48,7 +48,7 @@ def hangs_on(armature: bpy.types.Object) -> dict[str, set[str]]:
     for bone in shown.pose.bones:
         needed = {bone.parent.name} if bone.parent is not None else set()
         for constraint in bone.constraints:
-            if constraint.mute or constraint.influence <= 0.0:
+            if not acts(constraint):
                 continue
             targets = _targets(constraint, armature.name)
             own: Any = constraint
@@ -112,7 +112,7 @@ def reaches(armature: bpy.types.Object) -> list[Reach]:
     for bone in armature.pose.bones:
         for each in bone.constraints:
             own: Any = each
-            if own.type != "IK" or own.mute or own.influence <= 0.0:
+            if own.type != "IK" or not acts(own):
                 continue
             chain = ik_chain(bone, own)
             goal = own.subtarget if own.target == armature else ""
@@ -129,7 +129,7 @@ def spline_leads(armature: bpy.types.Object) -> set[str]:
         name
         for bone in armature.pose.bones
         for each in bone.constraints
-        if each.type == "SPLINE_IK" and not each.mute and each.influence > 0.0
+        if each.type == "SPLINE_IK" and acts(each)
         for name in _targets(each, armature.name)
     }
 
@@ -162,7 +162,7 @@ def _bones_behind(
         own: Any = each
         if each.type == "HOOK":
             found |= _bones_behind(own.object, own.subtarget, armature, passed)
-        elif getattr(own, "influence", 0.0) > 0.0 and not own.mute:
+        elif isinstance(each, bpy.types.Constraint) and acts(each):
             more = getattr(own, "target", None), getattr(own, "subtarget", "")
             found |= _bones_behind(*more, armature, passed)
     return found

@@ -35,6 +35,7 @@ from ...core.posing.puppet import (
 from ...core.rotations import Floats, from_matrix
 from ...core.skeleton import Skeleton
 from .armature import (
+    acts,
     armature_data,
     carrying_bone,
     driven_channels,
@@ -304,7 +305,7 @@ def moved_bones(armature: bpy.types.Object) -> frozenset[str]:
     found = {
         bone.name
         for bone in armature.pose.bones
-        if any(each.type not in _TOLERANT and _acts(each) for each in bone.constraints)
+        if any(each.type not in _TOLERANT and acts(each) for each in bone.constraints)
     }
     found.update(bent_bones(armature))
     found.update(
@@ -322,7 +323,7 @@ def carried_bones(armature: bpy.types.Object) -> set[str]:
     """
     assert armature.pose is not None
     acting = {
-        bone.name: {each.type for each in bone.constraints if _acts(each)}
+        bone.name: {each.type for each in bone.constraints if acts(each)}
         for bone in armature.pose.bones
     }
     return {name for name, kinds in acting.items() if kinds <= _CARRYING and not kinds <= _TOLERANT}
@@ -335,7 +336,7 @@ def _followed(armature: bpy.types.Object) -> str:
         getattr(each, "target", None)
         for bone in armature.pose.bones
         for each in bone.constraints
-        if _acts(each)
+        if acts(each)
     ]
     others = Counter(
         each.name for each in targets if each and each.type == "ARMATURE" and each != armature
@@ -350,13 +351,9 @@ def bent_bones(armature: bpy.types.Object) -> set[str]:
         each
         for bone in armature.pose.bones
         for constraint in bone.constraints
-        if constraint.type in {"IK", "SPLINE_IK"} and _acts(constraint)
+        if constraint.type in {"IK", "SPLINE_IK"} and acts(constraint)
         for each in ik_chain(bone, constraint)
     }
-
-
-def _acts(constraint: bpy.types.Constraint) -> bool:
-    return not constraint.mute and constraint.influence > 0.0
 
 
 def bone_marks(armature: bpy.types.Object) -> dict[str, str]:

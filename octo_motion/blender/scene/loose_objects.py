@@ -15,6 +15,7 @@ from ...core.phrases import phrase
 from ...core.posing.puppet import DENSITY, Figure, Pose, inertia_of, solid_moments, thing
 from ...core.posing.solver import Box, Capsule, Hull, Obstacle, Plane, Sphere
 from ...core.rotations import Floats, from_matrix, to_matrix
+from ..rig import acts
 from .surfaces import read_obstacle
 
 _WOOD: Final = 0.5
@@ -50,7 +51,7 @@ class LooseObject:
                 phrase("'{item}' is linked and cannot be pushed about.", item=item.name),
                 "Make a library override, or let it stand still (Pose > World).",
             )
-        if any(not each.mute and each.influence > 0.0 for each in item.constraints):
+        if any(acts(each) for each in item.constraints):
             raise RigError(
                 phrase("Constraints hold '{item}': it cannot be pushed about.", item=item.name),
                 "Mute them, or let it stand still (Pose > World).",

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whole clips are carried over as fast as one waits for it."""
+"""Whole clips are carried over in as many calls, however long they are: no frame costs one."""
 
-import time
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +13,6 @@ from octo_motion.core.splicing.transfer.whole_body import WholeBody, retarget_cl
 from tests.core.rigs import skeleton_of
 from tests.core.splice_bodies import LANDMARKS, humanoid, motion
 
-FRAMES = 10_000
 BONES = 60
 
 
@@ -49,13 +48,29 @@ def bodies(frames: int) -> tuple[Clip, Clip, Clip]:
     return still, replace(still.taken([0]), name="base"), source
 
 
-def test_ten_thousand_frames_onto_sixty_bones_take_less_than_three_seconds() -> None:
-    still, base, source = bodies(FRAMES)
-    begun = time.process_time()
-    result = retarget_clip(MappedClip(base, LANDMARKS), still, MappedClip(source, LANDMARKS))
-    assert time.process_time() - begun < 3.0
+def calls(frames: int) -> int:
+    """Functions that are called, Python's and numpy's, to retarget so many frames."""
+    still, base, source = bodies(frames)
+    count = 0
+
+    def counted(_frame: object, event: str, _argument: object) -> None:
+        nonlocal count
+        count += event in {"call", "c_call"}
+
+    sys.setprofile(counted)
+    try:
+        result = retarget_clip(MappedClip(base, LANDMARKS), still, MappedClip(source, LANDMARKS))
+    finally:
+        sys.setprofile(None)
     assert np.isfinite(result.rotations).all()
     assert np.isfinite(result.locations).all()
+    return count
+
+
+def test_ten_thousand_frames_onto_sixty_bones_take_no_more_calls_than_two_thousand() -> None:
+    """90,919 for 2000 frames, 90,551 for 10,000."""
+    calls(100)  # the first time more is done: what is known of a skeleton is worked out once
+    assert calls(10_000) < 1.1 * calls(2_000)
 
 
 def test_feet_are_held_at_the_clips_rate_whatever_that_of_the_body_is() -> None:

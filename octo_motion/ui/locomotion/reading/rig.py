@@ -21,6 +21,7 @@ from ....blender.animation import (
     read_channels,
 )
 from ....blender.rig import (
+    acts,
     armature_data,
     even_scale,
     is_driven_object,
@@ -352,7 +353,7 @@ def warnings_for_driven(
             )
         )
     travels = settings.travel_on == "OBJECT"
-    if travels and any(not each.mute and each.influence > 0.0 for each in armature.constraints):
+    if travels and any(acts(each) for each in armature.constraints):
         told.append(
             phrase("Constraints move '{armature}' away from its route.", armature=armature.name)
         )
