@@ -69,7 +69,7 @@ def own_action(armature: bpy.types.Object) -> tuple[bpy.types.Action, str] | Non
     data = armature.animation_data
     if data is None or data.action is None:
         return None
-    return data.action, data.action_slot.identifier if data.action_slot else ""
+    return _with_slot(data.action, data.action_slot)
 
 
 def played_action(armature: bpy.types.Object) -> tuple[bpy.types.Action, str] | None:
@@ -82,4 +82,10 @@ def played_action(armature: bpy.types.Object) -> tuple[bpy.types.Action, str] | 
     moved = abs(strip.frame_start - strip.action_frame_start) > _ON_FRAME
     if moved or strip.scale != 1.0 or strip.repeat != 1.0 or strip.use_reverse:
         return None
-    return strip.action, strip.action_slot.identifier if strip.action_slot else ""
+    return _with_slot(strip.action, strip.action_slot)
+
+
+def _with_slot(
+    action: bpy.types.Action, slot: bpy.types.ActionSlot | None
+) -> tuple[bpy.types.Action, str]:
+    return action, slot.identifier if slot else ""

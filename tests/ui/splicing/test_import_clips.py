@@ -454,12 +454,12 @@ def test_what_to_export_otherwise_is_said_of_a_file_that_cannot_be_used(
 
 
 def test_meshes_that_are_compressed_are_read_or_named(tmp_path: Path) -> None:
-    """A path of this Blender's own library was all that was said; others have it, and go on."""
+    """A path of Blender's own library was all that was said; that of 4.5 passes them over."""
     path = tmp_path / "a.gltf"
     path.write_text(compressed(), encoding="utf-8")
     with pytest.raises(ClipError) as error:
         import_clip(path, bpy.context)
-    assert re.search("compressed by Draco|cannot read it|moves objects", str(error.value))
+    assert re.search("compressed by Draco|moves objects", str(error.value))
     assert ".so" not in str(error.value)
 
 

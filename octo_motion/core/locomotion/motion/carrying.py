@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A motion taken from where it was planned to where it plays: rolled up onto its ground again."""
+"""A motion taken from its plan to where it plays: rolled up onto its ground again, or laid on it."""
 
 from __future__ import annotations
 
@@ -9,10 +9,13 @@ from typing import Final
 
 import numpy as np
 
+from ...content_cache import ContentCache, content_key
 from ...rotations import IDENTITY, Floats, multiply, normalized, rotate, shortest_arc, slerp
 from ...smoothing import smooth_step
-from ..ground import Carpet, Ground, Unrolled, turn_between
+from ..ground import Carpet, Ground, HeightField, Unrolled, sample_ground, turn_between
 from ..rig import ArmFrames, ArmMotion, BodyFrame
+from .job import MotionJob
+from .segments import EDGE, FINE, Standing
 
 _ATTACHED: Final = 0.4
 """Share of an arm from its root over which it passes from its body's turn to the ground's."""
@@ -27,6 +30,18 @@ _WIDE: Final = 0.5
 _AIR: Final = (0.12, 0.45)
 """Arm lengths above the ground up to which an arm lies there, and from which on it does not."""
 _CROSS: Final = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0], [0.0, 0.0]])
+_UPRIGHT: Final = float(np.cos(np.radians(1.0)))
+"""Cosine of how far the up of a body in place may be off the vertical, and it is laid on a mesh:
+else the artist has laid it somehow."""
+_RESTING: Final = 0.05
+"""Arm lengths of a stride up to which a body in place rests: under one that walks there the ground
+goes by, and is level."""
+_ABOUT: Final = 1.8
+"""Arm lengths to all sides up to which that mesh is looked at."""
+_ON_GROUND: Final = 0.5
+"""Arm lengths from it up to which a body stands on it, and not above or below."""
+
+_floors: Final[ContentCache[tuple[HeightField, HeightField]]] = ContentCache(2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +166,49 @@ class Laid:
             before = result[:, joint - 1]
             result[:, joint] = before + own[:, joint] * (joints[:, joint] - before)
         return result
+
+
+def laid_on(job: MotionJob, standing: Standing | None, reach: float) -> Laid | None:
+    """The mesh that lies about a body that rests in place; none where there is none, or where it is
+    to stand otherwise.
+
+    Args:
+        job: the motion.
+        standing: how its gait stands, if it does.
+        reach: metres that arms are long.
+    """
+    creature, floor, ground = job.creature, job.floor, job.ground
+    if not job.in_place or floor is None or ground is None or standing is None:
+        return None
+    if job.gaits[0].travel.stride > _RESTING:
+        return None
+    world, up = creature.world, creature.body.rotation[:, 2]
+    upright = (world[:3, :3] @ up)[2] > _UPRIGHT * creature.scale
+    if job.begin is not None or job.end is not None or not upright:
+        return None
+    place = world[:3, 3]
+
+    def about() -> tuple[HeightField, HeightField]:
+        sampled = sample_ground(
+            floor.triangles,
+            place[None],
+            np.zeros(1, dtype=bool),
+            reach=_ABOUT * reach,
+            spacing=FINE * reach,
+            headroom=reach,
+            content=floor.content,
+            bare=float(place[2]),
+        )
+        return sampled, sampled.rounded(EDGE * reach)
+
+    sampled, felt = _floors.get(content_key(floor.content, place, reach), about)
+    if abs(float(sampled.height(place[None, :2])[0] - place[2])) > _ON_GROUND * reach:
+        return None
+    stays, level = not creature.root_bone, float(place[2])
+    if stays:
+        # Nothing lifts the body to its height: level ground is as far below it as that asks for.
+        level -= float(standing.line.clearances[0] - creature.scale * creature.body.center @ up)
+    return Laid(sampled, felt, level, reach, ground.stance.lean, stays)
 
 
 def carried(  # noqa: PLR0917 - what is carried, where it is, and when

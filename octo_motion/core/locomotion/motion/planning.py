@@ -34,7 +34,6 @@ from ..ground import (
     HeightField,
     Unrolled,
     roll_out,
-    sample_ground,
 )
 from ..path import (
     Course,
@@ -67,7 +66,7 @@ from ..rig import (
     object_transforms,
     stretch_mantle,
 )
-from .carrying import Carry, Laid
+from .carrying import Carry, Laid, laid_on
 from .job import (
     BodyJob,
     ChangesByHeight,
@@ -78,21 +77,11 @@ from .job import (
     Timing,
     Tolerances,
 )
-from .segments import (
-    EDGE,
-    FINE,
-    Gait,
-    Nearby,
-    Segments,
-    Standing,
-    Transitions,
-    standing_on,
-)
+from .segments import Gait, Nearby, Segments, Standing, Transitions, standing_on
 
 _posers: Final[ContentCache[GaitPoser]] = ContentCache(12)
 
 _unrolled_known: Final[ContentCache[tuple[Unrolled, Floats, np.ndarray] | None]] = ContentCache(2)
-_floors: Final[ContentCache[tuple[HeightField, HeightField]]] = ContentCache(2)
 _frames_known: Final[ContentCache[list[ArmFrames]]] = ContentCache(4)
 
 
@@ -405,7 +394,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         stalking=stalking,
         warnings=tuple(warnings),
         carry=_along(job, carry, faces, standing),
-        laid=_laid_on(job, standing),
+        laid=laid_on(job, standing, reach_of(creature)),
     )
 
 
@@ -450,44 +439,6 @@ def plan_near(
     segments = Segments([moving], [walk], None, bones, when.route)
     yield 1.0
     return replace(plan, segments=segments), moments
-
-
-def _laid_on(job: MotionJob, standing: Standing | None) -> Laid | None:
-    """The mesh that lies about a body that rests in place; none where there is none, or where it is
-    to stand otherwise.
-    """
-    creature, floor, ground = job.creature, job.floor, job.ground
-    if not job.in_place or floor is None or ground is None or standing is None:
-        return None
-    if job.gaits[0].travel.stride > _RESTING:
-        return None
-    world, up = creature.world, creature.body.rotation[:, 2]
-    upright = (world[:3, :3] @ up)[2] > _UPRIGHT * creature.scale
-    if job.begin is not None or job.end is not None or not upright:
-        return None
-    reach, place = reach_of(creature), world[:3, 3]
-
-    def about() -> tuple[HeightField, HeightField]:
-        sampled = sample_ground(
-            floor.triangles,
-            place[None],
-            np.zeros(1, dtype=bool),
-            reach=_ABOUT * reach,
-            spacing=FINE * reach,
-            headroom=reach,
-            content=floor.content,
-            bare=float(place[2]),
-        )
-        return sampled, sampled.rounded(EDGE * reach)
-
-    sampled, felt = _floors.get(content_key(floor.content, place, reach), about)
-    if abs(float(sampled.height(place[None, :2])[0] - place[2])) > _ON_GROUND * reach:
-        return None
-    stays, level = not creature.root_bone, float(place[2])
-    if stays:
-        # Nothing lifts the body to its height: level ground is as far below it as that asks for.
-        level -= float(standing.line.clearances[0] - creature.scale * creature.body.center @ up)
-    return Laid(sampled, felt, level, reach, ground.stance.lean, stays)
 
 
 def _along(
@@ -754,16 +705,6 @@ def _self_motion(
     )
 
 
-_UPRIGHT: Final = float(np.cos(np.radians(1.0)))
-"""Cosine of how far the up of a body in place may be off the vertical, and it is laid on a mesh:
-else the artist has laid it somehow."""
-_RESTING: Final = 0.05
-"""Arm lengths of a stride up to which a body in place rests: under one that walks there the ground
-goes by, and is level."""
-_ABOUT: Final = 1.8
-"""Arm lengths to all sides up to which that mesh is looked at."""
-_ON_GROUND: Final = 0.5
-"""Arm lengths from it up to which a body stands on it, and not above or below."""
 _CROUCHED: Final = 0.05
 """Arm lengths by which a body that stalks crouches at its stops …"""
 _ABOVE: Final = 0.5
