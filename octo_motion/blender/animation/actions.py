@@ -579,11 +579,10 @@ class _Written:
                     else:
                         points[:, 1] = channel.values[:, component]
                         there = _fill_dense(curve, points, kinds)
-                if not there.told:
-                    there = _tell(curve, there, channel)
+                own_handles = there.handles if there.told else _tell(curve, channel)
                 digests[place] = there.digest
-                if there.handles is not None:
-                    handles[place] = there.handles
+                if own_handles is not None:
+                    handles[place] = own_handles
             yield
         for curve in curves.values():
             # Its group goes with the last of its curves.
@@ -668,8 +667,10 @@ class HalfWritten:
                     else:
                         points[:, 1] = channel.values[:, component]
                         found = _fill_dense(curve, points, kinds)
-                    found = replace(found, had_own_handles=own)
-                    self.curves[place] = _tell(curve, found, channel) if seen else found
+                    told = _tell(curve, channel) if seen else None
+                    self.curves[place] = replace(
+                        found, had_own_handles=own, handles=told, told=seen
+                    )
 
     def give_back(self) -> None:
         """Let the action be as it was."""
@@ -788,14 +789,16 @@ def _fill_bezier(curve: bpy.types.FCurve, keys: BezierKeys, component: int) -> _
     return _Filled(len(keys), digest, told=False)
 
 
-def _tell(curve: bpy.types.FCurve, filled: _Filled, channel: Channel) -> _Filled:
-    """Let Blender look at a curve's keys anew, and put its handles right."""
+def _tell(curve: bpy.types.FCurve, channel: Channel) -> np.ndarray | None:
+    """Let Blender look at a curve's keys anew, and put its handles right; these (keys, 4), if it
+    has some of its own.
+    """
     if channel.keys is None:
         # They are in order, and none at one and the same frame: all that is left are handles.
         curve.keyframe_points.handles_recalc()
-        return replace(filled, told=True)
+        return None
     curve.update()
-    return replace(filled, handles=_handles(curve), told=True)
+    return _handles(curve)
 
 
 def _read_keys(curve: bpy.types.FCurve) -> dict[str, np.ndarray]:

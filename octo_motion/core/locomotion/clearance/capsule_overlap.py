@@ -11,7 +11,7 @@ from one place, no pose can keep these apart.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any, Final, TypeVar
@@ -551,9 +551,9 @@ class Touching:
             yield 0.0
         return all_of(found)
 
-    def look_at(self, frames: np.ndarray, without: np.ndarray) -> None:
+    def looking_at(self, frames: np.ndarray, without: np.ndarray) -> Generator[float, None, None]:
         """Look from now on only at what is near enough for arms that make way, in frames (frames,)
-        in which anybody may have to.
+        in which anybody may have to; in steps.
 
         Some pairs (``Touches.pair``) are left as they are.
         """
@@ -561,11 +561,15 @@ class Touching:
         kept = ~np.isin(one * len(self._owner) + other, without)
         self._pairs = one[kept], other[kept]
         self._watched, self._seen_at = frames, self._crowd.joints.copy()
-        self._rows = self._near(np.repeat(frames[:, None], self._arms, axis=1))
+        found: list[np.ndarray] = []
+        for each in self._near(np.repeat(frames[:, None], self._arms, axis=1)):
+            found.append(each)
+            yield 0.0
+        self._rows = _joined(found)
 
-    def _near(self, anew: np.ndarray) -> np.ndarray:
+    def _near(self, anew: np.ndarray) -> Iterator[np.ndarray]:
         """Frame, the one and the other (3, n) of what is near to arms (frames, arms) where joints
-        were seen.
+        were seen, a piece at a time.
         """
         asked = np.zeros((len(anew), self._arms + len(self._still)), dtype=bool)
         asked[:, : self._arms] = anew
@@ -584,10 +588,9 @@ class Touching:
             reach = (1.0 + np.where(wrong, NEAR, _BESIDE * NEAR)) * seen.wide + self._slack
             return rows[:, seen.distance <= reach]
 
-        found = near(
+        return near(
             self._middles, self._pairs, near_enough, margin=NEAR, slack=self._slack, anew=asked
         )
-        return np.concatenate([np.zeros((3, 0), dtype=np.intp), *found], axis=1)
 
     def _may_be_wrong(self, points: Floats, rows: np.ndarray) -> np.ndarray:
         """Which may be on the wrong side of each other, told from where their middles are."""
@@ -601,8 +604,10 @@ class Touching:
         half, other_half = (0.5 * np.sqrt(dot(each, each)) for each in steps)
         return dot(apart, self._side(*rows)) <= half + other_half + self._slack
 
-    def _look_again(self, joints: Floats) -> None:
-        """Look anew at arms that have moved too far, of joints (frames, arms, joints, 3)."""
+    def looking_again(self, joints: Floats) -> Generator[float, None, None]:
+        """Look anew at arms that have moved too far, of joints (frames, arms, joints, 3); in steps,
+        between which nobody asks.
+        """
         moved = joints - self._seen_at
         squares = np.einsum("fajc,fajc->faj", moved, moved).max(axis=2)
         anew = self._watched[:, None] & (squares > (0.5 * self._slack) ** 2)
@@ -614,7 +619,11 @@ class Touching:
         moving = np.zeros((len(anew), self._arms + len(self._still)), dtype=bool)
         moving[:, : self._arms] = anew
         kept = ~(moving[frame, self._owner[one]] | moving[frame, self._owner[other]])
-        rows = np.concatenate([self._rows[:, kept], self._near(anew)], axis=1)
+        found = [self._rows[:, kept]]
+        for each in self._near(anew):
+            found.append(each)
+            yield 0.0
+        rows = _joined(found)
         # In an order of their own: sums over them come out the same, whatever moved before.
         count = len(self._owner)
         self._rows = rows[
@@ -633,14 +642,14 @@ class Touching:
 
     def at(self, joints: Floats) -> Touches:
         """What is near to what, for joints (frames, arms, joints, 3)."""
-        return all_of(self.of_each(joints, lambda touches: touches))
+        return all_of(list(self.of_each(joints, lambda touches: touches)))
 
-    def of_each(self, joints: Floats, make: Callable[[Touches], _Made]) -> list[_Made]:
+    def of_each(self, joints: Floats, make: Callable[[Touches], _Made]) -> Iterator[_Made]:
         """What is made of some of that after the other; one at least."""
-        self._look_again(joints)
+        finished(self.looking_again(joints))
         points = self._points(joints)
-        every = portions(self._rows.shape[1], _ROWS_AT_ONCE) or [slice(0, 0)]
-        return [make(self._at(points, self._rows[:, piece])) for piece in every]
+        for piece in portions(self._rows.shape[1], _ROWS_AT_ONCE) or [slice(0, 0)]:
+            yield make(self._at(points, self._rows[:, piece]))
 
     def _points(self, joints: Floats) -> Floats:
         """(3, points) where capsules start and end: joints (frames, arms, joints, 3), the body."""
@@ -674,6 +683,11 @@ class Touching:
             side=self._side(frame, one, other),
             pair=one * len(self._owner) + other,
         )
+
+
+def _joined(found: Iterable[np.ndarray]) -> np.ndarray:
+    """Rows (3, n) one after the other."""
+    return np.concatenate([np.zeros((3, 0), dtype=np.intp), *found], axis=1)
 
 
 def all_of(found: Sequence[Touches]) -> Touches:

@@ -547,7 +547,8 @@ def raising_between_frames(
     clear = course.clear(joints)
     lift = np.zeros(clear.shape)
     yield
-    tried = [(poses, course.dips(poses, clear))]
+    every = list(range(len(course.arms)))
+    tried = [(poses, (yield from _dipping(course, poses, clear, every)))]
     for _ in range(_ROUNDS):
         yield
         last, deep = tried[-1]
@@ -569,9 +570,20 @@ def raising_between_frames(
             strains[chosen, bones] = fresh.strains[:, bones]
         clear[np.ix_(chosen, arms)] = course.clear(places, arms)
         higher = Poses(rotations, strains, poses.locations, poses.orientations)
-        deep[:, arms] = course.dips(higher, clear, arms)
+        deep[:, arms] = yield from _dipping(course, higher, clear, arms)
         tried.append((higher, deep))
     return _best(course, tried, lift > 0.0)
+
+
+def _dipping(
+    course: ArmsOverGround, poses: Poses, clear: Floats, arms: Sequence[int]
+) -> Generator[None, None, Floats]:
+    """How deep some arms dip, as :meth:`ArmsOverGround.dips` says of them, in steps."""
+    found = []
+    for number in arms:
+        found.append(course.dips(poses, clear, [number]))
+        yield
+    return np.concatenate(found, axis=1)
 
 
 def _best(

@@ -189,7 +189,7 @@ def parting(
     # Who makes way may be in the way of others then, but not for ever.
     around = widened(deep, _AROUND * blur_reach(width), cyclic=cyclic) > 0.0
     yield 0.0
-    touching.look_at(around, own_form)
+    yield from touching.looking_at(around, own_form)
     yield 0.0
     crowded = _Parting(
         *(crowd, touching, np.flatnonzero(around), floor),
@@ -247,16 +247,19 @@ class _Parting:
         lies = crowd.in_contact.any(axis=2)
         self._held = np.where(lies, 1.0, self._covered(lies.astype(np.float64), brief=True))
         self._anchor = _anchors(crowd.in_contact)
-        self._free, self._loose = (
-            self._in_time(each, crowd.kept[..., None]) for each in _freedom(crowd.in_contact)
-        )
+        self._free, self._loose = _freedom(crowd.in_contact)
         self._allowed, self._room = self._clearance()
 
     def run(self) -> Generator[float, None, Floats]:
         """Joints (frames, arms, joints, 3) after all rounds, in steps."""
         rounds = _ROUNDS + _REPEATS
+        kept = self._crowd.kept[..., None]
+        self._free = self._in_time(self._free, kept)
+        yield 0.0
+        self._loose = self._in_time(self._loose, kept)
+        yield 0.0
         for number in range(_ROUNDS):
-            asked = self._asked()
+            asked = yield from self._asking(number / rounds)
             if not number:
                 self._depths_before = self._depths(asked.touches)
             yield number / rounds
@@ -271,7 +274,10 @@ class _Parting:
             yield number / rounds
         given_up = np.zeros(self._held.shape)
         for number in range(_ROUNDS, rounds):
-            more = np.maximum(given_up, self._hopeless(self._asked().touches))
+            asked = yield from self._asking(number / rounds)
+            deep = self._too_deep(asked.touches)
+            yield number / rounds
+            more = np.maximum(given_up, self._hopeless(deep))
             if np.array_equal(more, given_up):
                 break
             given_up = more
@@ -310,9 +316,14 @@ class _Parting:
 
     # --- One round ---
 
-    def _asked(self) -> _Asked:
-        """Who is asked to make way where joints are now; all that overlap are."""
-        found = self._touching.of_each(self._joints, _Asked.of)
+    def _asking(self, done: float) -> Generator[float, None, _Asked]:
+        """Who is asked to make way where joints are now; all that overlap are. In steps."""
+        for _ in self._touching.looking_again(self._joints):
+            yield done
+        found: list[_Asked] = []
+        for each in self._touching.of_each(self._joints, _Asked.of):
+            found.append(each)
+            yield done
         return _Asked(
             all_of([each.touches for each in found]),
             np.concatenate([each.way for each in found], axis=1),
@@ -465,11 +476,16 @@ class _Parting:
         if self._floor is not None:
             self._room[chosen] = self._floor.clearance(chosen[0], joints) - self._allowed[chosen]
 
-    def _hopeless(self, touches: Touches) -> Floats:
-        """Which arms (frames, arms) could not make way, or not without a jump, 0…1."""
+    def _too_deep(self, touches: Touches) -> Floats:
+        """Which arms (frames, arms) are deeper in each other than they were, 0…1."""
         before = widened(self._depths_before, blur_reach(self._width), cyclic=self._cyclic)
-        result = _beyond(self._depths(touches) / np.maximum(before, _SHALLOW))
-        changed = self._changed()
+        return _beyond(self._depths(touches) / np.maximum(before, _SHALLOW))
+
+    def _hopeless(self, deep: Floats) -> Floats:
+        """Which arms (frames, arms) could not make way, or not without a jump, 0…1, those too deep
+        among them.
+        """
+        result, changed = deep.copy(), self._changed()
         most = max(float(self._turns_before.max(initial=0.0)), self._most)
         turns = self._turns_before.copy()
         # Between two frames of which neither has changed it turns as it did.

@@ -20,6 +20,7 @@ from ...content_cache import part_of
 from ...rotations import Floats
 from ...rotations.components_first import dot
 from ...smoothing import blurred, smooth_step
+from ...steps import finished
 from ..ground import drawn
 from .capsule_overlap import Capsules, Crowd, Touches, Touching
 from .overlap_solver import Floor, joints_of, turned_towards
@@ -70,7 +71,8 @@ def led_past(
     if not len(items[0]):
         return None
     touching = Touching(crowd, still)
-    touching.look_at((passing.share > 0.0).any(axis=1), np.zeros(0, dtype=np.intp))
+    watched = (passing.share > 0.0).any(axis=1)
+    finished(touching.looking_at(watched, np.zeros(0, dtype=np.intp)))
     rod = _Rods.of(crowd, passing, items)
     joints, moved = crowd.joints.copy(), False
     for _ in range(_ROUNDS):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A motion taken from its plan to where it plays: rolled up onto its ground again, or laid on it."""
+"""A motion taken from its plan to where it plays: rolled up onto its ground, or laid on it."""
 
 from __future__ import annotations
 

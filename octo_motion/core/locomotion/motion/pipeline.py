@@ -122,7 +122,7 @@ _EXACT_DISTANCE: Final = 0.002
 """… and arm lengths of an arm's tip."""
 _BONES_AT_ONCE: Final = 96_000
 """Bones times frames of one step of the work: some tens of megabytes …"""
-_BONES_IN_BRIEF: Final = 6_000
+_BONES_IN_BRIEF: Final = 3_500
 """… and where Blender goes on meanwhile; the numbers are the same."""
 _EASINGS: Final = 4
 """How often bones that turn too fast are given more time, and kept off the ground again."""

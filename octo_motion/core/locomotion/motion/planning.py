@@ -346,6 +346,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     job, carry, faces = yield from scaled(_planning(job), 0.0, 0.0)
     yield 0.0
     when = schedule(job)
+    yield 0.0
     route, lean = when.route, when.lean
     plane = _lowest(route) if isinstance(job.changes, ChangesByHeight) else None
     changes = bool(job.changes) and not job.in_place
@@ -379,6 +380,11 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     creature, pushed = job.creature, _surge(job, segments, route)
     stalking = _stalking(job, when, segments)
     yield 0.9
+    # A mantle that is stretched out is one of the organs.
+    alive = len(mantle) or _moves_by_itself(job.body)
+    moving = _self_moving(job, when, segments, pushed, stalking)
+    self_motion = (yield from scaled(moving, 0.9, 0.95)) if alive else None
+    yield 0.95
     return MotionPlan(
         job=job,
         segments=segments,
@@ -386,10 +392,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         pace=pace,
         mantle=mantle,
         mantle_rotations=stretch_mantle(creature.skeleton, mantle, creature.body, job.streamline),
-        # A mantle that is stretched out is one of the organs.
-        self_motion=_self_motion(job, when, segments, pushed, stalking)
-        if len(mantle) or _moves_by_itself(job.body)
-        else None,
+        self_motion=self_motion,
         surge=pushed,
         stalking=stalking,
         warnings=tuple(warnings),
@@ -666,18 +669,19 @@ def _moves_by_itself(body: BodyJob) -> bool:
     return max(of.mantle, of.siphon, of.eyes, of.head, body.breathing.amount) > 0.0
 
 
-def _self_motion(
+def _self_moving(
     job: MotionJob,
     when: Schedule,
     segments: Segments,
     pushed: Surge | None,
     stalking: Stalking | None,
-) -> SelfMotion:
-    """What the body does by itself, at even steps of its time."""
+) -> Generator[None, None, SelfMotion]:
+    """What the body does by itself, at even steps of its time; in steps."""
     creature, first, body = job.creature, segments.gaits[0], job.body
     times = steps_of(when.seconds * float(when.times[-1]))
     bearings = first.standing.bearings if first.standing is not None else None
     travel = plan_travel(when.route, when.travel, times / when.seconds, bearings)
+    yield
     places, turns = segments.places(travel)
     if pushed is not None:
         places = places + pushed.at(travel.distance)

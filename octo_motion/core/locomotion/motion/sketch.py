@@ -176,6 +176,7 @@ class Sketch:
         plan, part = yield from plan_near(
             plan.job, plan, frames[first], frames[last - 1], anew=anew
         )
+        yield 0.4
         body = body_at(plan, plan.moments[1][part])
         yield 0.5
         bare = yield from plan.segments.posing_by_themselves(body.travel, body.places)

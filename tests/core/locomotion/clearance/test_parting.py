@@ -347,7 +347,7 @@ def test_what_an_arm_comes_near_to_as_it_makes_way_is_seen() -> None:
     group = crowd(straight(still, 0.1, at=0.0), straight(still, 0.1, at=0.5))
     along = np.linspace(0.0, 1.0, JOINTS)
     touching = Touching(group, [])
-    touching.look_at(np.ones(FRAMES, dtype=bool), np.zeros(0, dtype=int))
+    finished(touching.looking_at(np.ones(FRAMES, dtype=bool), np.zeros(0, dtype=int)))
     moved, seen = group.joints.copy(), touching.at(group.joints)
     for _ in range(25):
         moved[: FRAMES // 2, 1, :, 1] -= 0.04 * along
