@@ -261,7 +261,7 @@ class _Parting:
         for number in range(_ROUNDS):
             asked = yield from self._asking(number / rounds)
             if not number:
-                self._depths_before = self._depths(asked.touches)
+                self._depths_before = _depths(asked.touches, self._held.shape)
             yield number / rounds
             sunk = self._room.min() < -1e-4 * self._length
             if np.max(asked.touches.depth, initial=0.0) <= _DONE and not sunk:
@@ -479,7 +479,7 @@ class _Parting:
     def _too_deep(self, touches: Touches) -> Floats:
         """Which arms (frames, arms) are deeper in each other than they were, 0…1."""
         before = widened(self._depths_before, blur_reach(self._width), cyclic=self._cyclic)
-        return _beyond(self._depths(touches) / np.maximum(before, _SHALLOW))
+        return _beyond(_depths(touches, self._held.shape) / np.maximum(before, _SHALLOW))
 
     def _hopeless(self, deep: Floats) -> Floats:
         """Which arms (frames, arms) could not make way, or not without a jump, 0…1, those too deep
@@ -496,14 +496,6 @@ class _Parting:
         result[:-1] = np.maximum(result[:-1], swift)
         result[self._room.min(axis=2) < -TOLERATED * self._length] = 1.0
         return np.where(changed | (result < 1.0), result, 0.0)
-
-    def _depths(self, touches: Touches) -> Floats:
-        """How deep (frames, arms) arms are in anything."""
-        frames, arms = self._held.shape
-        worst = np.zeros((frames, arms + int(touches.arms[1].max(initial=0)) + 1))
-        for which in (0, 1):
-            np.maximum.at(worst, (touches.frame, touches.arms[which]), touches.depth)
-        return worst[:, :arms]
 
     def _changed(self) -> np.ndarray:
         """Which arms (frames, arms) have made way."""
@@ -525,6 +517,15 @@ class _Parting:
             self._put(chosen, mixed)
 
         _in_pieces(give_up, np.nonzero((share > 1e-9) & self._changed()))
+
+
+def _depths(touches: Touches, shape: tuple[int, ...]) -> Floats:
+    """How deep arms (frames, arms), so many, are in anything."""
+    frames, arms = shape
+    worst = np.zeros((frames, arms + int(touches.arms[1].max(initial=0)) + 1))
+    for which in (0, 1):
+        np.maximum.at(worst, (touches.frame, touches.arms[which]), touches.depth)
+    return worst[:, :arms]
 
 
 def _in_pieces(

@@ -346,7 +346,6 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     job, carry, faces = yield from scaled(_planning(job), 0.0, 0.0)
     yield 0.0
     when = schedule(job)
-    yield 0.0
     route, lean = when.route, when.lean
     plane = _lowest(route) if isinstance(job.changes, ChangesByHeight) else None
     changes = bool(job.changes) and not job.in_place
@@ -380,10 +379,8 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     creature, pushed = job.creature, _surge(job, segments, route)
     stalking = _stalking(job, when, segments)
     yield 0.9
-    # A mantle that is stretched out is one of the organs.
-    alive = len(mantle) or _moves_by_itself(job.body)
-    moving = _self_moving(job, when, segments, pushed, stalking)
-    self_motion = (yield from scaled(moving, 0.9, 0.95)) if alive else None
+    moving = _self_moving(job, when, segments, pushed, stalking, stretched=len(mantle) > 0)
+    self_motion = yield from scaled(moving, 0.9, 0.95)
     yield 0.95
     return MotionPlan(
         job=job,
@@ -675,8 +672,14 @@ def _self_moving(
     segments: Segments,
     pushed: Surge | None,
     stalking: Stalking | None,
-) -> Generator[None, None, SelfMotion]:
-    """What the body does by itself, at even steps of its time; in steps."""
+    *,
+    stretched: bool,
+) -> Generator[None, None, SelfMotion | None]:
+    """What the body does by itself, at even steps of its time; in steps. A mantle that is stretched
+    out is one of the organs.
+    """
+    if not (stretched or _moves_by_itself(job.body)):
+        return None
     creature, first, body = job.creature, segments.gaits[0], job.body
     times = steps_of(when.seconds * float(when.times[-1]))
     bearings = first.standing.bearings if first.standing is not None else None
