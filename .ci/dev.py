@@ -222,10 +222,11 @@ def test(arguments: Sequence[str]) -> None:
 
 
 def tests(python: str, arguments: Sequence[str], log: IO[bytes] | None) -> subprocess.Popen[bytes]:
+    # Two run side by side: threads of numpy's own would wait for each other.
     return subprocess.Popen(  # noqa: S603 - our own command
         [python, "-m", "pytest", *arguments],
         cwd=ROOT,
-        env=environment(),
+        env=environment(OPENBLAS_NUM_THREADS="1"),
         stdin=subprocess.DEVNULL,
         stdout=log,
         stderr=subprocess.STDOUT if log else None,
