@@ -34,6 +34,8 @@ from octo_motion.device.haptics.pointer import Pointer
 from octo_motion.device.messages import HeldMessage
 from octo_motion.device.sources.simulated_hand import Hand, Wish
 
+pytestmark = pytest.mark.one_blender
+
 PERIOD = 0.001
 MOST = 0.02
 """J, as docs/device.md and the tooltips promise."""

@@ -23,6 +23,8 @@ from octo_motion.device.sources.simulated_hand import Hand, SimulatedHand
 from tests.core.puppets import chain, posed, soft
 from tests.device.parts import FakeDriver
 
+pytestmark = pytest.mark.one_blender
+
 PERIOD = 0.001
 
 

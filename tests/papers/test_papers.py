@@ -17,6 +17,8 @@ from tests.core import oracle
 from tests.papers import pages
 from tests.papers.source_loop import TABLES, SourceArm, angles
 
+pytestmark = pytest.mark.one_blender
+
 STUDIO = pages.REPOSITORY / "docs" / "studio"
 
 

@@ -11,6 +11,7 @@ from tests.referee.__main__ import LIMITS, SHORT, beyond_limits, measured, poppi
 
 # Blender's importer leaves its files open.
 pytestmark = [
+    pytest.mark.one_blender,
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
 ]

@@ -32,6 +32,8 @@ from octo_motion.core.rotations import (
 from octo_motion.core.skeleton import Skeleton
 from tests.core.rigs import body_with_arms
 
+pytestmark = pytest.mark.one_blender
+
 LIMIT = np.radians(0.5)
 FAR = 1e9
 seeds = st.integers(0, 2**31)

@@ -46,6 +46,8 @@ from tests.core.splice_bodies import (
     turned_about,
 )
 
+pytestmark = pytest.mark.one_blender
+
 HEAD, LEFT_ARM, LEGS, RIGHT_ARM, TRUNK = (
     PARTS[name] for name in ("head", "left_arm", "legs", "right_arm", "trunk")
 )

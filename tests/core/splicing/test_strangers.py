@@ -16,11 +16,13 @@ from octo_motion.core.splicing.humanoid.fingers import FINGERS, finger_bones
 from octo_motion.core.splicing.humanoid.landmarks import LANDMARKS, Landmarks
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from octo_motion.core.splicing.transfer.parts import PARTS
-from octo_motion.core.splicing.transfer.splice import Splice
+from octo_motion.core.splicing.transfer.splice import Splice, build_splices
 from tests.core.splice_bodies import spliced
 from tests.core.stranger_kinds import EXPECTED, KINDS
 from tests.core.strangers import Action, Mover, Stranger, played
 from tests.referee.clip_measures import angle
+
+pytestmark = pytest.mark.one_blender
 
 SILENT = {"numbers"}
 """Their names say nothing: what was told by shape is said."""
@@ -142,14 +144,18 @@ def test_a_stranger_gives_and_takes_arms_legs_and_head_as_they_are(name: str, nu
         (person(name, "walk", number), person("mixamo", "throw", 0)),
         (person("mixamo", "walk", 0), person(name, "throw", number)),
     ):
-        for part, body, limbs, end in (
+        parts = (
             ("right_arm", "chest", ("upper_arm.R", "forearm.R", "hand.R"), 15.0),
             ("legs", "pelvis", ("thigh.L", "shin.L", "foot.L"), 10.0),
             ("head", "chest", ("neck", "head"), 6.0),
-        ):
-            splice = Splice(PARTS[part], source.clip, Timing(1, 1), source.marks)
-            result = spliced(onto.clip, onto.marks, splice)
-            heads = played(result)[1]
+        )
+        result = build_splices(
+            onto.clip,
+            onto.marks,
+            [Splice(PARTS[part], source.clip, Timing(1, 1), source.marks) for part, *_ in parts],
+        )
+        heads = played(result)[1]
+        for part, body, limbs, end in parts:
             laid = onto.mover.turns[body] @ source.mover.turns[body].transpose(0, 2, 1)
             for upper, lower in pairwise(limbs):
                 # A neck that carries the arms stays where it is; some have none.

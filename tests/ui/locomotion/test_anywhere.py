@@ -20,6 +20,8 @@ from tests.referee.held_ground import HeldGround, held
 from tests.referee.recording import Recording, moments, record
 from tests.referee.scenes import GROUNDS, build
 
+pytestmark = pytest.mark.one_blender
+
 ARM = 0.6
 """Metres: arms of the octopus that a script adds."""
 

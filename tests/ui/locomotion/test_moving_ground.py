@@ -18,6 +18,8 @@ from tests.referee import creature_measures as measures
 from tests.referee.held_ground import HeldGround, held
 from tests.referee.recording import moments, record
 
+pytestmark = pytest.mark.one_blender
+
 ARM = 0.6
 """Metres: arms of the octopus that a script adds."""
 _SIDE = 40

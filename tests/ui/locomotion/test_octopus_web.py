@@ -14,6 +14,8 @@ from tests.referee.surface import Surface
 from tests.referee.web_measures import Web, web
 from tests.ui.rig import generate, keys
 
+pytestmark = pytest.mark.one_blender
+
 _EVERY = 7
 """Half frames: so many moments are looked at, between frames too."""
 

@@ -14,6 +14,8 @@ from tests.referee.creature_measures import angles_between, arm_length, pop, ski
 from tests.referee.recording import Recording, moments, record, show
 from tests.ui.rig import Octopus, click, generate
 
+pytestmark = pytest.mark.one_blender
+
 OCTOPUS = Octopus(
     add_on=True, frames=145, settings={"travel_on": "NONE", "gait": "idle", "repeat": False}
 )

@@ -14,6 +14,8 @@ from tests.referee.surface import Surface
 from tests.ui.made import prepare
 from tests.ui.rig import bind_skin, click, generate, keys, make_octopus
 
+pytestmark = pytest.mark.one_blender
+
 _THICK = 0.05
 _ROUND = 12
 

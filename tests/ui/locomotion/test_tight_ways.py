@@ -16,6 +16,8 @@ from tests.referee.recording import moments, record
 from tests.referee.scenes import build
 from tests.referee.surface import Surface
 
+pytestmark = pytest.mark.one_blender
+
 ARM = 0.6
 """Metres: arms of the octopus that a script adds."""
 

@@ -642,11 +642,14 @@ class Touching:
 
     def at(self, joints: Floats) -> Touches:
         """What is near to what, for joints (frames, arms, joints, 3)."""
+        finished(self.looking_again(joints))
         return all_of(list(self.of_each(joints, lambda touches: touches)))
 
     def of_each(self, joints: Floats, make: Callable[[Touches], _Made]) -> Iterator[_Made]:
-        """What is made of some of that after the other; one at least."""
-        finished(self.looking_again(joints))
+        """What is made of some of that after the other; one at least.
+
+        To be called where :meth:`looking_again` has been.
+        """
         points = self._points(joints)
         for piece in portions(self._rows.shape[1], _ROWS_AT_ONCE) or [slice(0, 0)]:
             yield make(self._at(points, self._rows[:, piece]))

@@ -394,7 +394,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         stalking=stalking,
         warnings=tuple(warnings),
         carry=_along(job, carry, faces, standing),
-        laid=laid_on(job, standing, reach_of(creature)),
+        laid=laid_on(job, standing, reach_of(creature)) if job.in_place else None,
     )
 
 

@@ -17,6 +17,8 @@ from octo_motion.core.rotations import Floats, angle_between, from_axis_angle, n
 from octo_motion.core.skeleton import Skeleton
 from tests.core.rigs import UP, body_with_arms, posed_joints
 
+pytestmark = pytest.mark.one_blender
+
 PRESETS = gait.gait_presets()
 BUILDS = (3, 7, 12, 30)
 every_preset = pytest.mark.parametrize("name", sorted(PRESETS))

@@ -19,6 +19,8 @@ from octo_motion.core.locomotion.octopus.rig import (
 )
 from octo_motion.core.locomotion.octopus.shape import ARMS, JOINTS, OctopusShape
 
+pytestmark = pytest.mark.one_blender
+
 # The source's example, [Octopus] eq. 3.1 and 3.2: 12 joints, w₀ = 1, τ = 0.01.
 SOURCE_DIAMETERS = (1.0, 0.99, 0.98, 0.97, 0.96, 0.95, 0.94, 0.93, 0.92, 0.91, 0.9, 0.89)
 SOURCE_SEGMENTS = (0.5, 0.495, 0.49, 0.485, 0.48, 0.475, 0.47, 0.465, 0.46, 0.455, 0.45, 0.445)

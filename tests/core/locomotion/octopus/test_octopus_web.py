@@ -12,6 +12,8 @@ from octo_motion.core.locomotion.octopus.mesh import build_mesh
 from octo_motion.core.locomotion.octopus.shape import OctopusShape
 from octo_motion.core.locomotion.octopus.surface import OctopusMesh
 
+pytestmark = pytest.mark.one_blender
+
 SHAPES = {
     "default": OctopusShape(),
     "three arms": OctopusShape(arms=3, joints=3),
