@@ -201,7 +201,11 @@ def test(arguments: Sequence[str]) -> None:
             notes.append(f"Blender {version}: nothing can be rendered here; such tests are skipped")
     ran = bool(pythons) or failed
     with tempfile.TemporaryFile() as log:
-        running = {version: tests(pythons[version], arguments, log) for version in [*pythons][1:]}
+        both = len(pythons) > 1
+        running = {
+            version: tests(pythons[version], arguments, log, both=both)
+            for version in [*pythons][1:]
+        }
         try:
             for version, python in pythons.items():
                 print(f"== Tests under Blender {version}", flush=True)
@@ -211,7 +215,7 @@ def test(arguments: Sequence[str]) -> None:
                     sys.stdout.buffer.write(log.read())
                     sys.stdout.flush()
                 else:
-                    status = tests(python, arguments, None).wait()
+                    status = tests(python, arguments, None, both=both).wait()
                 failed |= status != 0
                 notes.append(f"Blender {version}: {'FAILED' if status else 'passed'}")
         finally:
@@ -221,12 +225,16 @@ def test(arguments: Sequence[str]) -> None:
     sys.exit(failed or not ran)
 
 
-def tests(python: str, arguments: Sequence[str], log: IO[bytes] | None) -> subprocess.Popen[bytes]:
-    # Two run side by side: threads of numpy's own would wait for each other.
+def tests(
+    python: str, arguments: Sequence[str], log: IO[bytes] | None, *, both: bool
+) -> subprocess.Popen[bytes]:
+    # Two run side by side: threads of numpy's own would wait for each other, and they share what
+    # one Blender is enough for.
+    beside = {"OCTO_MOTION_BESIDE_ANOTHER": "1"} if both else {}
     return subprocess.Popen(  # noqa: S603 - our own command
         [python, "-m", "pytest", *arguments],
         cwd=ROOT,
-        env=environment(OPENBLAS_NUM_THREADS="1"),
+        env=environment(OPENBLAS_NUM_THREADS="1", **beside),
         stdin=subprocess.DEVNULL,
         stdout=log,
         stderr=subprocess.STDOUT if log else None,

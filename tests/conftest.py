@@ -17,6 +17,8 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 WITHOUT_BLENDER = {"core", "device"}
+BESIDE_ANOTHER = "OCTO_MOTION_BESIDE_ANOTHER"
+"""What `make test` sets where it tests two Blenders side by side."""
 LACKING_DATA = "lacking data"
 """How tests are counted that were skipped because the collection of rigs and clips is not here."""
 
@@ -55,13 +57,25 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Of all tests, leave those that one Blender is enough for to the newer one."""
+    """Where another Blender is tested beside this one, leave it those that one is enough for: to
+    the older one what needs no Blender, to the newer one the rest.
+    """
     named = any(Path(each.split("::")[0]).exists() for each in config.invocation_params.args)
-    if named or sys.version_info >= (3, 12):
+    if named or BESIDE_ANOTHER not in os.environ:
         return
-    left = [each for each in items if each.get_closest_marker("one_blender")]
-    items[:] = [each for each in items if each not in set(left)]
-    config.hook.pytest_deselected(items=left)
+    newer = sys.version_info >= (3, 12)
+    left = {
+        each
+        for each in items
+        if each.get_closest_marker("one_blender")
+        and (_layer(each.path) in WITHOUT_BLENDER) == newer
+    }
+    items[:] = [each for each in items if each not in left]
+    config.hook.pytest_deselected(items=list(left))
+
+
+def _layer(path: Path) -> str:
+    return path.relative_to(REPOSITORY / "tests").parts[0]
 
 
 def pytest_report_teststatus(report: pytest.TestReport) -> tuple[str, str, str] | None:
@@ -113,7 +127,7 @@ def add_on() -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def clean_factory_state(request: pytest.FixtureRequest) -> None:
     """Start each test that uses Blender from factory settings and an empty file."""
-    layer = request.path.relative_to(REPOSITORY / "tests").parts[0]
+    layer = _layer(request.path)
     if layer in WITHOUT_BLENDER or layer.endswith(".py"):
         return
     import bpy
