@@ -156,7 +156,7 @@ def _places() -> dict[str, list[Place]]:
         "joints to bone rotations": [(generator, "rotate_bones")],
         "lay down what holds on": [(walk.GroundedWalk, "posing")],
         "let turns take their time": [(computing, "_take_time")],
-        "body, mantle, siphon, eyes": [(planning, "_self_motion"), (computing, "organs_at")],
+        "body, mantle, siphon, eyes": [(planning, "_self_moving"), (computing, "organs_at")],
         "off the ground between frames": [(computing, "_clearing")],
         "keep arms apart": [(computing, "_separate")],
         "measure the figures": [(computing, "_measuring"), (computing, "finding_figures")],
