@@ -433,6 +433,9 @@ _RAISED_FRAMES: Final = 1
 """Frames of the means by which arms rise and sink again: smoothly, within six frames."""
 _JERK: Final = np.radians(5.0)
 """How much farther a bone of an arm that is raised may turn within a frame."""
+_ARMS_AT_ONCE: Final = 3
+"""Arms that are looked at in one step. One by one, the way of the body, which all share, takes as
+long as they do."""
 _MOST: Final = 0.25
 """Arm lengths that an arm is raised at most: what needs more is no matter of frames."""
 
@@ -580,8 +583,8 @@ def _dipping(
 ) -> Generator[None, None, Floats]:
     """How deep some arms dip, as :meth:`ArmsOverGround.dips` says of them, in steps."""
     found = []
-    for number in arms:
-        found.append(course.dips(poses, clear, [number]))
+    for first in range(0, len(arms), _ARMS_AT_ONCE):
+        found.append(course.dips(poses, clear, arms[first : first + _ARMS_AT_ONCE]))
         yield
     return np.concatenate(found, axis=1)
 
