@@ -5,12 +5,22 @@ The chest is that of its joints (shoulders, neck, spine) on average over the cli
 bone: a shrug does not tilt it.
 """
 
+from dataclasses import replace
 from itertools import pairwise, permutations
 
 import numpy as np
 import pytest
 
-from octo_motion.core.rotations import Floats, multiply, to_matrix
+from octo_motion.core.rotations import (
+    Floats,
+    conjugate,
+    from_rotation_vector,
+    multiply,
+    normalized,
+    rotate,
+    shortest_arc,
+    to_matrix,
+)
 from octo_motion.core.splicing.clip.clip import Clip, sample_clip, sample_world
 from octo_motion.core.splicing.clip.splice_timing import Timing, splice_window
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
@@ -124,3 +134,49 @@ def test_an_arm_points_from_the_chest_where_it_does_in_its_clip(shared_data: Sha
                 off = np.linalg.norm(ours - theirs @ turned, axis=-1)
                 reached = np.linalg.norm(theirs, axis=-1) < 0.97
                 assert off[reached].max(initial=0.0) < 0.02, (name, other, goal)
+
+
+def with_an_arm_up(person: Person) -> Clip:
+    """The same clip with the right arm up all the time, its shoulder raised by 25°."""
+    clip = person.clip
+    skeleton, index = clip.skeleton, clip.skeleton.index
+    axes = person.chest(clip, clip.frames)
+    # From the chest to the right and up, and about what points ahead.
+    turns = sample_world(clip, clip.frames)[0]
+    raised = np.einsum("mij,j->mi", axes, np.array([-0.3, 0.0, 1.0]))
+    ahead = np.einsum("mij,j->mi", axes, np.array([0.0, -np.radians(25.0), 0.0]))
+    rotations = clip.rotations.copy()
+
+    def turn(landmark: str, by: Floats) -> None:
+        bone = index[person.marks[landmark]]
+        lay = skeleton.pose(rotations, clip.locations)[0][:, bone]
+        rotations[:, bone] = multiply(
+            rotations[:, bone], multiply(conjugate(lay), multiply(by, lay))
+        )
+
+    turn("clavicle.R", from_rotation_vector(rotate(conjugate(turns), ahead)))
+    heads = skeleton.pose(rotations, clip.locations)[1]
+    arm = (index[person.marks[f"{each}.R"]] for each in ("upper_arm", "forearm"))
+    root, elbow = (heads[:, bone] for bone in arm)
+    ways = normalized(elbow - root), normalized(rotate(conjugate(turns), raised))
+    turn("upper_arm.R", shortest_arc(*ways))
+    return replace(clip, rotations=rotations)
+
+
+def test_an_arm_that_is_up_all_the_time_turns_nothing_else(shared_data: SharedData) -> None:
+    # The other arm and the head of one clip onto a base, with an arm hanging and with an arm up.
+    found = persons(shared_data)
+    for (name, base), (other, person) in permutations(found.items(), 2):
+        timing = Timing(base.clip.frames[0], person.clip.frames[0])
+        seen = ("left_arm", "left_shoulder", "left_elbow"), ("head", "neck", "head")
+        for part, start, end in seen:
+            ways = []
+            for onto in (base.clip, with_an_arm_up(base)):
+                splice = Splice(PARTS[part], person.clip, timing, person.marks)
+                result = spliced(onto, base.marks, splice)
+                fully = splice_window(timing, onto, person.clip)
+                frames = onto.frames[fully.frames][fully.weights >= 1.0]
+                joints = joints_at(result, base.marks, frames)
+                ways.append(joints[end] - joints[start])
+            off = angle(*ways)
+            assert off.max(initial=0.0) < 3.0, (name, other, part)

@@ -13,7 +13,7 @@ each other instead: the frames then agree to the last digit whatever the two peo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -64,6 +64,12 @@ class AnatomicalFrame:
         if self.bone < 0:
             return self.origin
         return posture.head(self.bone) + rotate(posture.orientation(self.bone), self.origin)
+
+    def beginning_at(self, joint: int, skeleton: Skeleton) -> AnatomicalFrame:
+        """The same one with its origin where a joint is at rest."""
+        back = conjugate(skeleton.rest_rotations[self.bone])
+        place = rotate(back, skeleton.heads[joint] - skeleton.heads[self.bone])
+        return replace(self, origin=place)
 
     def at_rest(self, skeleton: Skeleton) -> Floats:
         """Orientation (4,) in the rest pose, armature space."""

@@ -81,8 +81,17 @@ _ROOTS: Final = (0.04, 0.08)
 from right, and where they tell it alone: at 0.086 they do to 0.1°, where an arm that is up all the
 time turns the shoulders by 17°."""
 
-_SQUARE: Final = float(np.cos(np.radians(20.0)))
-"""Cosine of the angle by which their line may be off that of the shoulders."""
+_SQUARE: Final = float(np.cos(np.radians(45.0)))
+"""Cosine of the angle by which their line may be off that of the shoulders: an arm that is up all
+the time on the other side of one that hangs turns the shoulders by 15–27°."""
+
+_ASKEW: Final = np.radians(5.0)
+"""By which shoulders lie off square to the trunk without an arm being up: recorded ones do by 3° to
+4°, those of one person by 7°."""
+
+_LONE: Final = (0.6, 1.4)
+"""Difference of two arms' heights, in lengths of an upper arm, from which on the higher one raises
+its shoulder, and at which it does so fully."""
 
 _X, _Y, _Z = np.eye(3)
 LIMBS: Final = (
@@ -301,23 +310,53 @@ class ReferenceFinder:
     def _chest_axes(self) -> Floats:
         """(4,) of the chest along its bone's axes: left by the shoulders, up along the trunk."""
         chest = self._bones["chest"]
-        low = self._joints("spine" if "spine" in self._bones else "hips")
-        left = self._joints("upper_arm.L") - self._joints("upper_arm.R")
-        return _axes(
-            self._shoulder_line(chest, left),
-            robust_direction(self._seen(chest, self._top() - low), self._standing),
-        )
+        trunk = self._top() - self._joints("spine" if "spine" in self._bones else "hips")
+        up = robust_direction(self._seen(chest, trunk), self._standing)
+        return _axes(self._collars(chest, self._shoulders(chest, trunk, up)), up)
 
-    def _shoulder_line(self, chest: int, left: Floats) -> Floats:
+    def _shoulders(self, chest: int, trunk: Floats, up: Floats) -> Floats:
+        """(3,) from right to left shoulder along the chest's axes, as with no arm higher than the
+        other.
+
+        Then they lie square to the neck, for bodies are alike on both sides, where it sits still on
+        the chest; and nearly square to the trunk.
+        """
+        left = self._joints("upper_arm.L") - self._joints("upper_arm.R")
+        line = robust_direction(self._seen(chest, left), self._standing)
+        neck = self._seen(chest, self._top() - self._joints("chest"))
+        place, width = np.median(neck, axis=0), float(np.median(lengths(left)))
+        middle, most = up, float(_ASKEW)
+        if lengths(neck - place).max() < _RIGID * width and lengths(place) > _ROOTS[1] * width:
+            middle, most = normalized(place), 0.0
+        sine = float(line @ middle)
+        if sine**2 > 1.0 - _SQUARE**2:
+            return line
+        angle = float(np.arcsin(sine))
+        share = self._raises_one_arm(normalized(trunk))
+        wanted = angle - share * (angle - float(np.clip(angle, -most, most)))
+        flat = normalized(line - sine * middle)
+        return np.cos(wanted) * flat + np.sin(wanted) * middle
+
+    def _raises_one_arm(self, up: Floats) -> float:
+        """From 0 to 1: how much higher one arm is than the other, all in all."""
+        if not {"forearm.L", "forearm.R"} <= self._bones.keys():
+            return 0.0
+        heights = [
+            dot(normalized(self._joints(f"forearm.{s}") - self._joints(f"upper_arm.{s}")), up)
+            for s in "LR"
+        ]
+        apart = np.average(heights[0] - heights[1], weights=self._standing)
+        return float(_between(np.abs(apart), _LONE))
+
+    def _collars(self, chest: int, shoulders: Floats) -> Floats:
         """(3,) to the left along the chest's axes: by the collar bones' roots, which no shrug
         and no raised arm moves; by the shoulders where those are in the middle or move.
         """
-        shoulders = robust_direction(self._seen(chest, left), self._standing)
         if not {"clavicle.L", "clavicle.R"} <= self._bones.keys():
             return shoulders
         roots = self._seen(chest, self._joints("clavicle.L") - self._joints("clavicle.R"))
         middle = np.median(roots, axis=0)
-        width = float(np.median(lengths(left)))
+        width = float(np.median(lengths(self._joints("upper_arm.L") - self._joints("upper_arm.R"))))
         apart = float(np.linalg.norm(middle))
         still = lengths(roots - middle).max() < _RIGID * width
         if not still or normalized(middle) @ shoulders < _SQUARE:

@@ -569,10 +569,13 @@ def _side_retarget(
             return bones, chest, pelvis
 
     (bones, chest, frame), (others, other_chest, other_frame) = map(seen, clips)
+    limb = None
+    if kind.limb is not None:
+        limb = _limb_joints(kind, side, base), _limb_joints(kind, side, splice)
     alike = same_build(base.skeleton, splice.skeleton, marks)
-    if alike:
-        other_chest, other_frame = laid_over(other_chest, chest), laid_over(other_frame, frame)
     chests, frames = (chest, other_chest), (frame, other_frame)
+    if alike:
+        chests, frames = (chest, laid_over(other_chest, chest)), _agreeing(frames, clips, limb)
     if kind.spine:
         found = _spine_retarget(clips, (bones, others), frames, chests)
         return replace(found, bodies=bodies_of(*clips), upright=asked == "world")
@@ -585,14 +588,30 @@ def _side_retarget(
         marks,
         referred=base.reference is not None,
     )
-    limb = None
-    if kind.limb is not None:
-        limb = _limb_joints(kind, side, base), _limb_joints(kind, side, splice)
     neck = _neck_joints(kind, clips, (bones, others))
     found = Retarget(
         base, splice, tuple(bones), frames, match, limb, None, neck=neck, same_build=alike
     )
     return replace(found, bodies=bodies_of(*clips), upright=True) if asked == "world" else found
+
+
+def _agreeing(
+    frames: tuple[AnatomicalFrame, AnatomicalFrame],
+    clips: tuple[MappedClip, MappedClip],
+    limb: tuple[tuple[int, int, int], tuple[int, int, int]] | None,
+) -> tuple[AnatomicalFrame, AnatomicalFrame]:
+    """Frames of one body, laid over each other by the joints that are fixed to both.
+
+    Where these do not tell, a limb is seen from where its own joint is on average: midway between
+    both, one shoulder that is raised all the time would shift the other arm.
+    """
+    ours, theirs = frames
+    laid = laid_over(theirs, ours)
+    if laid is not theirs or limb is None or min(ours.bone, theirs.bone) < 0:
+        return ours, laid
+    (joint, *_), (other, *_) = limb
+    base, splice = (each.skeleton for each in clips)
+    return ours.beginning_at(joint, base), theirs.beginning_at(other, splice)
 
 
 def bodies_of(base: MappedClip, splice: MappedClip) -> tuple[Body, Body] | None:
