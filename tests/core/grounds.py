@@ -12,7 +12,7 @@ from octo_motion.core.locomotion.gait.table import gait_presets
 from octo_motion.core.locomotion.ground.contact_timing import (
     BodyLine,
     EvenTiming,
-    body_line,
+    finding_line,
     leaning,
     timing_at_rest,
 )
@@ -35,6 +35,7 @@ from octo_motion.core.locomotion.rig.arm_chains import BodyFrame
 from octo_motion.core.locomotion.rig.poses import object_transforms
 from octo_motion.core.rotations import Floats, normalized, rotate
 from octo_motion.core.skeleton import Skeleton
+from octo_motion.core.steps import finished
 from tests.core.rigs import body_with_arms
 
 STRAIGHT = Route.bezier([[[0, 0, 0], [0, -1.5, 0], [0, -3.0, 0], [0, -4.5, 0]]])
@@ -163,15 +164,17 @@ def walker(
             duty=settings.duty,
         )
     bearings = bearings_of(route, travel)
-    line = body_line(
-        route,
-        travel,
-        bearings,
-        ground,
-        clearance=generator.clearance + 0.03,
-        reach=1.0,
-        lean=settings.lean,
-        smoothing=settings.smoothing,
+    line = finished(
+        finding_line(
+            route,
+            travel,
+            bearings,
+            ground,
+            clearance=generator.clearance + 0.03,
+            reach=1.0,
+            lean=settings.lean,
+            smoothing=settings.smoothing,
+        )
     )
     walk = GroundedWalk(
         skeleton,

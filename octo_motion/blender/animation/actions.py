@@ -667,9 +667,11 @@ class HalfWritten:
                     else:
                         points[:, 1] = channel.values[:, component]
                         found = _fill_dense(curve, points, kinds)
-                    told = _tell(curve, channel) if seen else None
+                    # Where handles are Blender's own, putting them right shows nothing yet.
+                    told = seen or channel.keys is None
+                    handles = _tell(curve, channel) if told else None
                     self.curves[place] = replace(
-                        found, had_own_handles=own, handles=told, told=seen
+                        found, had_own_handles=own, handles=handles, told=told
                     )
 
     def give_back(self) -> None:

@@ -9,7 +9,7 @@ arm for unit; so neither rest pose nor bone roll nor scale of the rig matters.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -32,6 +32,7 @@ from ...rotations import (
 from ...rotations.components_first import cumulative_sum
 from ...settings import check_settings, setting, share_setting
 from ...skeleton import Skeleton
+from ...steps import finished
 from ..rig import (
     ArmRest,
     BodyFrame,
@@ -326,6 +327,11 @@ def _built(skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame, lean: flo
 _known: Final[ContentCache[_Built]] = ContentCache(2)
 
 
+_Cycle = tuple[Floats, dict[int, Floats]]
+"""Heights (phases, arms) over the body's centre of each arm's lowest joint, and the shape
+(segments, 3) of each arm half way through its stance."""
+
+
 class GaitPoser:
     """Moves the arms of one body.
 
@@ -391,12 +397,14 @@ class GaitPoser:
         for each in weights:
             _check_weights(each)
         self.builds = builds_of(segments, weights, on_ground=gait.on_ground)
-        self._floor = -np.inf
         self._few: ContentCache[tuple[Floats, Floats]] = ContentCache()
-        if settings.raise_to_floor and gait.on_ground:
-            floor = float(np.quantile(self._whole_cycle()[0], _STANDING))
-            if floor < -_LEAST_DEPTH * self.arm_length:
-                self._floor = floor
+
+    def preparing(self) -> Generator[None, None, None]:
+        """Look at its whole cycle in steps; else that is done once it is asked for."""
+        if self._asks_for_a_floor and "_bare" not in self.__dict__:
+            self.__dict__["_bare"] = yield from self._going_round(-np.inf)
+        if "_cycle" not in self.__dict__:
+            self.__dict__["_cycle"] = yield from self._going_round(self._floor)
 
     @property
     def bones(self) -> tuple[str, ...]:
@@ -416,16 +424,33 @@ class GaitPoser:
         """
         return -float(self._cycle[0].min())
 
-    @cached_property
-    def _cycle(self) -> tuple[Floats, dict[int, Floats]]:
-        return self._whole_cycle()
+    @property
+    def _asks_for_a_floor(self) -> bool:
+        return self.settings.raise_to_floor and self.settings.gait.on_ground
 
-    def _whole_cycle(self) -> tuple[Floats, dict[int, Floats]]:
-        """Heights (phases, arms) over the body's centre of each arm's lowest joint, and shapes.
+    @cached_property
+    def _floor(self) -> float:
+        """Height over the body's centre that pseudo-targets are raised to; −∞ for none."""
+        if not self._asks_for_a_floor:
+            return -np.inf
+        floor = float(np.quantile(self._bare[0], _STANDING))
+        return floor if floor < -_LEAST_DEPTH * self.arm_length else -np.inf
+
+    @cached_property
+    def _bare(self) -> _Cycle:
+        """The whole cycle of arms that know no floor."""
+        return finished(self._going_round(-np.inf))
+
+    @cached_property
+    def _cycle(self) -> _Cycle:
+        """The whole cycle."""
+        return finished(self._going_round(self._floor))
+
+    def _going_round(self, floor: float) -> Generator[None, None, _Cycle]:
+        """The whole cycle over a floor, in steps.
 
         At phases of the arms' own: arms that are built alike and have one curve go through the
-        same heights, whichever side they are on, so one of them is looked at. The shapes
-        (segments, 3) are those of each arm half way through its stance.
+        same heights, whichever side they are on, so one of them is looked at.
         """
         gait = self.settings.gait
         samples = _ROUGH_SAMPLES if self.rough else _CYCLE_SAMPLES
@@ -447,9 +472,9 @@ class GaitPoser:
             angles[..., [PITCH, BANK]] *= self._hands[chosen][:, None, None]
             # Not from what is kept: that does not know the floor.
             steering = np.zeros((1, len(chosen)))
-            asked = self.chains(part, angles, steering)
+            asked = _chains_over(self, floor, part, angles, steering)
             shaping = self.shaping(part, angles, steering, asked, rough=self.rough)
-            (directions,) = deque(shaping, maxlen=1)
+            directions = yield from _last(shaping)
             # Up is the same for the arm's frame and the body's.
             climbs = cumulative_sum(build.chain.lengths[:, None, None] * directions[:, 2])
             lowest = np.minimum(climbs.min(axis=0), 0.0)
@@ -593,21 +618,7 @@ class GaitPoser:
         a build's arms, from :meth:`asked`, in their frames and lengths; heights (arms,) of the
         floor that targets are raised to, none where there is none.
         """
-        width = build.widths * (1.0 + contraction(angles, self.settings.contraction)) ** (
-            # A group of a single bone cannot shorten.
-            np.array(build.chain.sizes) > 1
-        )
-        steered = angles.copy()
-        steered[..., 0, PITCH] += steering
-        links = link_rotations(steered)
-        targets = pseudo_targets(links, width)
-        # Two targets raised to one height come nearer to each other, which a single bone cannot.
-        if not np.isfinite(self._floor) or min(build.chain.sizes) == 1:
-            return links, targets, None
-        columns = list(build.arms)
-        floor = (self._floor - self.roots[columns, 2]) / self.lengths[columns]
-        targets[..., 1:, 2] = smooth_floor(targets[..., 1:, 2], floor[:, None], FLOOR_ROUNDING)
-        return links, targets, floor
+        return _chains_over(self, self._floor, build, angles, steering)
 
     def _shapes(self, build: Build, angles: Floats, steering: Floats) -> tuple[Floats, Floats]:
         asked = self.chains(build, angles, steering)
@@ -620,18 +631,45 @@ class GaitPoser:
         return directions, np.moveaxis(missed.reshape(GROUPS, frames, arms), 0, -1)
 
 
+def _chains_over(
+    poser: GaitPoser, level: float, build: Build, angles: Floats, steering: Floats
+) -> tuple[Floats, Floats, Floats | None]:
+    """What :meth:`GaitPoser.chains` says, over a floor at this height over the body's centre."""
+    width = build.widths * (1.0 + contraction(angles, poser.settings.contraction)) ** (
+        # A group of a single bone cannot shorten.
+        np.array(build.chain.sizes) > 1
+    )
+    steered = angles.copy()
+    steered[..., 0, PITCH] += steering
+    links = link_rotations(steered)
+    targets = pseudo_targets(links, width)
+    # Two targets raised to one height come nearer to each other, which a single bone cannot.
+    if not np.isfinite(level) or min(build.chain.sizes) == 1:
+        return links, targets, None
+    columns = list(build.arms)
+    floor = (level - poser.roots[columns, 2]) / poser.lengths[columns]
+    targets[..., 1:, 2] = smooth_floor(targets[..., 1:, 2], floor[:, None], FLOOR_ROUNDING)
+    return links, targets, floor
+
+
+def _last(steps: Iterator[Floats]) -> Generator[None, None, Floats]:
+    """The last of what comes after each of some steps."""
+    last = np.empty(0)
+    for last in steps:  # noqa: B007 - the last one
+        yield
+    return last
+
+
 class RoughGaitPoser(GaitPoser):
     """One that is soon made: its cycle is looked at once, and what would reach below the floor is
     taken to lie on it.
     """
 
     rough = True
-    _looked: tuple[Floats, dict[int, Floats]] | None = None
 
-    def _whole_cycle(self) -> tuple[Floats, dict[int, Floats]]:
-        if self._looked is None:
-            self._looked = super()._whole_cycle()
-        depths, middles = self._looked
+    @cached_property
+    def _cycle(self) -> _Cycle:
+        depths, middles = self._bare
         return np.maximum(depths, self._floor), middles
 
     def corrected(self, rough: GaitPoser, exact: GaitPoser) -> RoughGaitPoser:

@@ -7,7 +7,7 @@ set-ups on bumps of 0.3 arm lengths.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Final, Protocol
@@ -35,6 +35,8 @@ frame to frame instead of 0.53."""
 _MOST_HEADROOM: Final = 0.9
 """The same at most, where that is not enough for its skin. At 0.45 arms of Crawl overlap by 0.059
 radii instead of 0.019."""
+_PARTS: Final = 3
+"""Steps in which a body's line is asked for where the route goes."""
 _LIFTS: Final = 3
 """How often what a body lacks of it is added, evened out: that alone takes some of it away. Twice
 or six times change no figure by a fiftieth."""
@@ -101,7 +103,7 @@ def leaning(upright: Floats, rotations: Floats) -> Floats:
     return multiply(shortest_arc(np.broadcast_to(_UP, upright.shape), upright), rotations)
 
 
-def body_line(
+def finding_line(
     route: Route,
     settings: TravelSettings,
     bearings: Bearings,
@@ -113,8 +115,8 @@ def body_line(
     smoothing: float,
     under: float = 0.0,
     around: tuple[float, float] | None = None,
-) -> BodyLine:
-    """The line of a body that walks on a ground.
+) -> Generator[float, None, BodyLine]:
+    """The line of a body on a ground, in steps that yield what share of both is found.
 
     Args:
         route: where to.
@@ -133,7 +135,11 @@ def body_line(
     start, end = around or (0.0, route.length)
     count = int(np.ceil((end - start + 2.0 * margin) / spacing)) + 1
     distance = start - margin + spacing * np.arange(count)
-    positions, turns = walked_at(route, settings, bearings, distance, coarse=around is not None)
+    walked: list[tuple[Floats, Floats]] = []
+    for part in np.array_split(distance, _PARTS):
+        walked.append(walked_at(route, settings, bearings, part, coarse=around is not None))
+        yield 0.6 + 0.2 * len(walked) / _PARTS
+    positions, turns = (np.concatenate(each) for each in zip(*walked, strict=True))
     along, left = _ways(positions)
     felt = ground.height(positions[:, None, :2] + reach * _ACROSS[:, None] * left[:, None])
     kernel, share = _bell(width / spacing), distance / route.length
@@ -142,11 +148,7 @@ def body_line(
     level = _over_bumps(
         _evened(felt @ _SHARES, kernel), felt, (clearances, headroom), _bell(0.5 * width / spacing)
     )
-    ahead = np.gradient(level, spacing)
-    # Least squares through the heights across the way.
-    sideways = _evened(felt @ _ACROSS / (_ACROSS @ _ACROSS * reach), kernel)
-    tilt = -ahead[:, None] * along - sideways[:, None] * left
-    leaned = normalized(np.concatenate([tilt, np.ones((count, 1))], axis=1))
+    leaned = _upright_on(felt, (along, left), np.gradient(level, spacing), reach, kernel)
     leans = values_along(settings.along.lean, share, lean)[:, None]
     uprights = normalized((1.0 - leans) * _UP + leans * leaned)
     return BodyLine(
@@ -161,6 +163,17 @@ def body_line(
         ways=positions,
         turns=continuous(turns),
     )
+
+
+def _upright_on(
+    felt: Floats, ways: tuple[Floats, Floats], ahead: Floats, reach: float, kernel: Floats
+) -> Floats:
+    """Unit vectors (n, 3) up from a ground (n, places across the way) that climbs so much (n,)."""
+    # Least squares through the heights across the way.
+    sideways = _evened(felt @ _ACROSS / (_ACROSS @ _ACROSS * reach), kernel)
+    along, left = ways
+    tilt = -ahead[:, None] * along - sideways[:, None] * left
+    return normalized(np.concatenate([tilt, np.ones((len(tilt), 1))], axis=1))
 
 
 def _ways(positions: Floats) -> tuple[Floats, Floats]:

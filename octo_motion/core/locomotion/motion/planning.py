@@ -352,10 +352,11 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     gaits: list[Gait] = []
     for number, each in enumerate(job.gaits if changes else job.gaits[:1]):
         poser = _poser(job, each, lean)
-        yield 0.5 * (number + 0.2) / len(job.gaits)
+        share = 0.5 * (number + 0.2) / len(job.gaits)
+        yield from scaled(poser.preparing(), share, share)
         making = _making_gait(job, each, poser, route, lean=lean, plane=plane)
-        start, end = (0.5 * (number + share) / len(job.gaits) for share in (0.2, 1.0))
-        gaits.append((yield from scaled(making, start, end)))
+        end = 0.5 * (number + 1.0) / len(job.gaits)
+        gaits.append((yield from scaled(making, share, end)))
         yield end
     overrides = job.ground.overrides if job.ground is not None else ()
     standing = gaits[0].standing

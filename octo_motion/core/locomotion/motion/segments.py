@@ -36,10 +36,10 @@ from ..ground import (
     Raise,
     StanceSettings,
     SwingSmoothing,
-    body_line,
     crawling,
     crawling_in_place,
     easy_height,
+    finding_line,
     frames_around,
     ground_along_path,
     leaning,
@@ -257,8 +257,7 @@ def standing_on(
     (ground, underfoot), warnings = yield from _finding_ground(
         job, route, travel, bearings, reach=reach, plane=plane, cyclic=cyclic, near=near
     )
-    yield 0.6
-    line = body_line(
+    line = yield from finding_line(
         *(route, travel, bearings, ground),
         clearance=_height(poser, job) * scale if height is None else height,
         reach=reach,
@@ -267,7 +266,6 @@ def standing_on(
         under=_under(poser, job) * scale,
         around=near and near.around(travel.stride, route.length),
     )
-    yield 0.8
     if near and not cyclic:
         phases, job = near.phases(travel.stride), near.as_rested(job, travel.stride, route.length)
     return Standing(

@@ -13,9 +13,9 @@ from octo_motion.core.locomotion.ground.contact_timing import (
     CrawlingBody,
     EvenTiming,
     TabledTiming,
-    body_line,
     crawl_timing,
     crawling_in_place,
+    finding_line,
     timing_at_rest,
 )
 from octo_motion.core.locomotion.ground.crawl_planner import CrawlSettings, CrawlStances, plan_crawl
@@ -24,6 +24,7 @@ from octo_motion.core.locomotion.ground.surface import LevelGround, StanceSettin
 from octo_motion.core.locomotion.path.course import route_in_place
 from octo_motion.core.locomotion.path.travel import TravelSettings, bearings_of
 from octo_motion.core.rotations import from_axis_angle
+from octo_motion.core.steps import finished
 from tests.core.locomotion.ground.test_crawl import journey
 
 MIDDLE, DUTY = np.radians(225.0), 0.55
@@ -162,15 +163,17 @@ def test_a_crawl_that_is_planned_from_rest_to_rest_is_left_as_it_was_planned() -
 @pytest.mark.parametrize("arms", [1, 8])
 def test_a_crawl_in_place_has_its_loop_however_long_its_stances(arms: int, stretch: float) -> None:
     travel, route = TravelSettings(stride=0.8), route_in_place(0.8, 2)
-    line = body_line(
-        route,
-        travel,
-        bearings_of(route, travel),
-        LevelGround(0.0),
-        clearance=0.2,
-        reach=1.0,
-        lean=0.0,
-        smoothing=0.3,
+    line = finished(
+        finding_line(
+            route,
+            travel,
+            bearings_of(route, travel),
+            LevelGround(0.0),
+            clearance=0.2,
+            reach=1.0,
+            lean=0.0,
+            smoothing=0.3,
+        )
     )
     outward = from_axis_angle(np.array([0.0, 0.0, 1.0]), 0.5 + 0.7 * np.arange(arms))
     roots = np.zeros((arms, 3))

@@ -7,12 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from octo_motion.core.locomotion.ground.arm_curves import bent, curve, drawn, spread_chain
-from octo_motion.core.locomotion.ground.contact_timing import body_line
+from octo_motion.core.locomotion.ground.contact_timing import finding_line
 from octo_motion.core.locomotion.ground.footholds import easy_height
 from octo_motion.core.locomotion.ground.surface import StanceSettings
 from octo_motion.core.locomotion.path.travel import TravelSettings, bearings_of
 from octo_motion.core.rotations import Floats
 from octo_motion.core.rotations.components_first import normalized
+from octo_motion.core.steps import finished
 from tests.core.grounds import STRAIGHT, bumps, largest_turn, walker
 
 
@@ -65,16 +66,18 @@ def test_from_its_easy_height_an_arm_reaches_the_ground_beside_it(joints: int) -
 @pytest.mark.parametrize("under", [0.0, 0.12])
 def test_a_low_body_keeps_its_skin_out_of_a_hill_it_passes(under: float) -> None:
     ground, travel = bumps(), TravelSettings(stride=1.0)
-    line = body_line(
-        STRAIGHT,
-        travel,
-        bearings_of(STRAIGHT, travel),
-        ground,
-        clearance=0.16,
-        reach=1.0,
-        lean=0.7,
-        smoothing=0.35,
-        under=under,
+    line = finished(
+        finding_line(
+            STRAIGHT,
+            travel,
+            bearings_of(STRAIGHT, travel),
+            ground,
+            clearance=0.16,
+            reach=1.0,
+            lean=0.7,
+            smoothing=0.35,
+            under=under,
+        )
     )
     centres, _ = line.at(np.linspace(0.0, STRAIGHT.length, 400))
     gap = centres[:, 2] - ground.height(centres)
