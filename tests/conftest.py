@@ -17,6 +17,8 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 WITHOUT_BLENDER = {"core", "device"}
+UNDER_THE_OLDER = {*WITHOUT_BLENDER, "blender", "bench"}
+"""Whose tests with the mark `one_blender` run under the older of two, where both run."""
 BESIDE_ANOTHER = "OCTO_MOTION_BESIDE_ANOTHER"
 """What `make test` sets where it tests two Blenders side by side."""
 LACKING_DATA = "lacking data"
@@ -58,7 +60,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Where another Blender is tested beside this one, leave it those that one is enough for: to
-    the older one what needs no Blender, to the newer one the rest.
+    the older one about half of them, to the newer one the rest.
     """
     named = any(Path(each.split("::")[0]).exists() for each in config.invocation_params.args)
     if named or BESIDE_ANOTHER not in os.environ:
@@ -68,7 +70,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         each
         for each in items
         if each.get_closest_marker("one_blender")
-        and (_layer(each.path) in WITHOUT_BLENDER) == newer
+        and (_layer(each.path) in UNDER_THE_OLDER) == newer
     }
     items[:] = [each for each in items if each not in left]
     config.hook.pytest_deselected(items=list(left))

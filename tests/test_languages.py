@@ -13,7 +13,10 @@ from octo_motion.ui import language
 from octo_motion.ui.panel_base import lines_of
 from tests import texts
 
-pytestmark = pytest.mark.usefixtures("add_on")
+pytestmark = [
+    pytest.mark.usefixtures("add_on"),
+    pytest.mark.one_blender,
+]
 LANGUAGES = sorted(language.languages())
 COMPLETE = ["ja_JP"]
 """Languages that lack nothing."""

@@ -40,7 +40,10 @@ from tests.bench.splice_pairs import (
 )
 from tests.core.splice_bodies import in_another_file
 
-pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.one_blender,
+]
 
 SharedData = Callable[[str], Path]
 

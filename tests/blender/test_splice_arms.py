@@ -31,7 +31,10 @@ from tests.blender.test_splice_laws import GOALS, SharedData, people
 from tests.core.splice_bodies import spliced
 from tests.referee.clip_measures import angle, chest
 
-pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning"),
+    pytest.mark.one_blender,
+]
 
 PEOPLE = (
     "secondlife/avatar_walk.bvh",
@@ -166,7 +169,9 @@ def with_an_arm_up(person: Person) -> Clip:
 def test_an_arm_that_is_up_all_the_time_turns_nothing_else(shared_data: SharedData) -> None:
     # The other arm and the head of one clip onto a base, with an arm hanging and with an arm up.
     found = persons(shared_data)
-    for (name, base), (other, person) in permutations(found.items(), 2):
+    for number, ((name, base), (other, person)) in enumerate(permutations(found.items(), 2)):
+        if number % 3:
+            continue
         timing = Timing(base.clip.frames[0], person.clip.frames[0])
         seen = ("left_arm", "left_shoulder", "left_elbow"), ("head", "neck", "head")
         for part, start, end in seen:

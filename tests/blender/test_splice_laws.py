@@ -41,7 +41,10 @@ from tests.core.splice_bodies import spliced
 LEFT_ARM, LEGS, RIGHT_ARM = (PARTS[name] for name in ("left_arm", "legs", "right_arm"))
 
 # Blender's importer leaves the file open.
-pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning"),
+    pytest.mark.one_blender,
+]
 
 SharedData = Callable[[str], Path]
 

@@ -29,7 +29,10 @@ from tests.referee.rest_poses import (
     with_rest,
 )
 
-pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning"),
+    pytest.mark.one_blender,
+]
 
 SharedData = Callable[[str], Path]
 RestOf = Callable[[Joint, Floats], Floats]

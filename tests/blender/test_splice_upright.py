@@ -16,7 +16,10 @@ from tests.blender.test_splice_laws import SharedData, load, people
 from tests.core.splice_bodies import spliced
 from tests.referee.clip_measures import angle, lean
 
-pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning"),
+    pytest.mark.one_blender,
+]
 
 PEOPLE = (
     "secondlife/avatar_walk.bvh",

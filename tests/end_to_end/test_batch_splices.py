@@ -26,7 +26,10 @@ REPOSITORY = Path(__file__).resolve().parent.parent.parent
 CLIPS = REPOSITORY / "docs" / "examples" / "clips"
 
 # Blender's importer leaves the file open.
-pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning"),
+    pytest.mark.one_blender,
+]
 
 # Blender keeps keys in single precision, and Euler angles round a little more.
 ROUNDING = 1e-4

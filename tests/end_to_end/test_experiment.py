@@ -11,6 +11,8 @@ import bpy
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.one_blender
+
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
 CELL = (30, 38)
 APART = 4

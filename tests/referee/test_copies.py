@@ -13,7 +13,10 @@ import pytest
 
 from tests.referee.copies import Off, keep, sweep
 
-pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+    pytest.mark.one_blender,
+]
 
 SharedData = Callable[[str], Path]
 

@@ -51,7 +51,9 @@ def keep(folder: Path, language: str, run: dict[str, Any]) -> Path:
     import bpy
 
     sheet: Any = bpy.data.images.load(str(folder / "hour.png"))
-    one: Any = bpy.data.images.load(str(next(folder.glob("first_walk_*.png"))))
+    # Any step's will do: all are of one window.
+    pictures = sorted(each for each in folder.glob("*_*.png") if each.name != "hour.png")
+    one: Any = bpy.data.images.load(str(pictures[0]))
     size = "{}x{}".format(*one.size)
     width, height = sheet.size
     sheet.scale(_WIDTH, round(height * _WIDTH / width))

@@ -57,6 +57,8 @@ CHANNELS_AT_ONCE: Final = 6
 or so."""
 _CURVES_AT_ONCE: Final = 50
 """How many are read at one step to see whether they have been edited."""
+_TOLD_AT_ONCE: Final = 150
+"""How many Blender looks at anew at one step: after each of them it works the frame out again."""
 _LEAST_SPACING: Final = 0.01
 """Blender takes keys that are no further apart, in frames, for one and the same."""
 
@@ -267,7 +269,7 @@ def _mark_written(
 ) -> None:
     tracks = _tracks_of(action)
     fingerprint = deque(_fingerprint(action, written.digests), maxlen=1).pop()
-    _mark(action, owner, settings_note, fingerprint, written.handles)
+    _mark(action, owner, settings_note, fingerprint, written.handles, keys=written.keys)
     action[MARK]["frames"] = frames
     for key, track in tracks.items():
         action[MARK][key] = track
@@ -357,6 +359,8 @@ def _mark(
     settings_note: str,
     fingerprint: str,
     handles: Mapping[tuple[str, int], np.ndarray],
+    *,
+    keys: int | None = None,
 ) -> None:
     action[MARK] = {
         "owner": owner,
@@ -364,7 +368,7 @@ def _mark(
         "version": _MARK_VERSION,
         "fingerprint": fingerprint,
         "note": settings_note,
-        "keys": key_count(action),
+        "keys": key_count(action) if keys is None else keys,
         "curves": sum(len(each.fcurves) for each in channelbags_of(action)),
     }
     if handles:
@@ -535,6 +539,8 @@ class _Written:
         """The hash of each curve's keys: to read them back takes longer than to write them."""
         self.handles: dict[tuple[str, int], np.ndarray] = {}
         """The handles of those that have keys of their own."""
+        self.keys = 0
+        """How many there are."""
 
     def filling(
         self,
@@ -581,6 +587,7 @@ class _Written:
                         there = _fill_dense(curve, points, kinds)
                 own_handles = there.handles if there.told else _tell(curve, channel)
                 digests[place] = there.digest
+                self.keys += there.count
                 if own_handles is not None:
                     handles[place] = own_handles
             yield
@@ -667,12 +674,32 @@ class HalfWritten:
                     else:
                         points[:, 1] = channel.values[:, component]
                         found = _fill_dense(curve, points, kinds)
-                    # Where handles are Blender's own, putting them right shows nothing yet.
-                    told = seen or channel.keys is None
-                    handles = _tell(curve, channel) if told else None
+                    told = _tell(curve, channel) if seen else None
                     self.curves[place] = replace(
-                        found, had_own_handles=own, handles=handles, told=told
+                        found, had_own_handles=own, handles=told, told=seen
                     )
+        if not seen:
+            yield from self._telling(channels)
+
+    def _telling(self, channels: Sequence[Channel]) -> Iterator[None]:
+        """Let Blender look at what is filled, in steps: at the first of them all is seen that was
+        filled, and has to be all that there is; handles, which are put right, count between keys.
+        """
+        places = {
+            (channel.data_path, component): channel
+            for channel in channels
+            for component in range(channel.values.shape[1])
+        }
+        if self.curves.keys() != places.keys():
+            return
+        known = list(places.items())
+        for start in range(0, len(known), _TOLD_AT_ONCE):
+            yield
+            curves = self._curves()
+            for place, channel in known[start : start + _TOLD_AT_ONCE]:
+                if (curve := curves.get(place)) is not None:
+                    handles = _tell(curve, channel)
+                    self.curves[place] = replace(self.curves[place], handles=handles, told=True)
 
     def give_back(self) -> None:
         """Let the action be as it was."""
@@ -935,8 +962,8 @@ def _fingerprint(
             if len(listed) != count:
                 return
         path, index, state, curve = listed[number]
-        keys = curve.keyframe_points
-        modifiers = f"{len(curve.modifiers)}{_modifier_settings(curve)}"
+        keys, many = curve.keyframe_points, len(curve.modifiers)
+        modifiers = f"{many}{_modifier_settings(curve) if many else ''}"
         digest.update(f"({path!r}, {index}, {state}({len(keys)}, {modifiers})".encode())
         if known is not None:
             digest.update(known[path, index])

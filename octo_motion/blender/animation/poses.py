@@ -169,8 +169,10 @@ def posed_channels(
             continue
         for channel in ("location", rotation_property(bone.rotation_mode), "scale"):
             # A few numbers at a time: numpy would take longer to be called than to compare them.
-            pairs = zip(getattr(bone, channel), AT_REST[channel], strict=True)
-            away = not all(abs(now - rest) <= _UNMOVED for now, rest in pairs)
+            values, rests = (*getattr(bone, channel),), AT_REST[channel]
+            away = values != rests and not all(
+                abs(now - rest) <= _UNMOVED for now, rest in zip(values, rests, strict=True)
+            )
             if not (away or beneath):
                 continue
             path = bone.path_from_id(channel)

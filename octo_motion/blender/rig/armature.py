@@ -135,7 +135,9 @@ def read_skeleton(armature: bpy.types.Object) -> Skeleton:
             phrase("'{armature}' has bones at undefined positions.", armature=armature.name),
             "Repair its rest pose.",
         )
-    lengths = np.array([bone.length for bone in bones])
+    lengths = np.empty(len(bones), dtype=np.float32)
+    data.bones.foreach_get("length", lengths)
+    lengths = lengths.astype(np.float64)
     above = [bone.parent for bone in bones]
     parents = tuple(-1 if each is None else index[each.name] for each in above)
     driven = _driven_bones(armature)
@@ -145,16 +147,30 @@ def read_skeleton(armature: bpy.types.Object) -> Skeleton:
         parents=parents,
         rest_matrices=matrices,
         lengths=without_made_up_scale(lengths, matrices[:, :3, 3], parents),
-        connected=tuple(bone.use_connect for bone in bones),
-        deform=tuple(bone.use_deform for bone in bones),
-        inherits_rotation=tuple(bone.use_inherit_rotation for bone in bones),
+        connected=_flags(data, "use_connect"),
+        deform=_flags(data, "use_deform"),
+        inherits_rotation=_flags(data, "use_inherit_rotation"),
         constrained=tuple(bone.name in driven for bone in bones),
         weighted=tuple(bone.name in weighted for bone in bones),
-        bendy_segments=tuple(bone.bbone_segments for bone in bones),
+        bendy_segments=_numbers(data, "bbone_segments"),
         sucker_axes=tuple(str(bone.get(SUCKER_PROPERTY, "")) for bone in bones),
     )
     # What was worked out of the same bones before stays with them.
     return _known.get(skeleton.content, lambda: skeleton)
+
+
+def _flags(data: bpy.types.Armature, name: str) -> tuple[bool, ...]:
+    """A property of all bones: read at once, that takes a fifth of the time."""
+    found = np.empty(len(data.bones), dtype=np.bool_)
+    data.bones.foreach_get(name, found)
+    return tuple(found.tolist())
+
+
+def _numbers(data: bpy.types.Armature, name: str) -> tuple[int, ...]:
+    """The same of whole numbers."""
+    found = np.empty(len(data.bones), dtype=np.int32)
+    data.bones.foreach_get(name, found)
+    return tuple(found.tolist())
 
 
 def selected_bones(armature: bpy.types.Object) -> tuple[str, ...]:

@@ -20,6 +20,8 @@ from octo_motion.core.splicing.transfer.splice import LimbGoal, Splice
 from tests.core.rigs import skeleton_of
 from tests.core.splice_bodies import LANDMARKS, humanoid, motion, moved, spliced
 
+pytestmark = pytest.mark.one_blender
+
 seeds = st.integers(0, 2**31)
 parts = st.sampled_from(list(PARTS.values()))
 goals = st.sampled_from(["direction", "exact"])

@@ -13,6 +13,8 @@ from tests.ui.locomotion.test_changes import steps
 from tests.ui.made import prepare
 from tests.ui.rig import click, generate, keys, still
 
+pytestmark = pytest.mark.one_blender
+
 STRAIGHT = {"b0": (0, 0, 0), "b1": (0, -2, 0), "b2": (0, -4, 0), "b3": (0, -6, 0)}
 LENGTH = 6.0
 ARM = 0.6

@@ -14,6 +14,8 @@ from tests.ui.locomotion.test_quality_report import measured_joints, played_join
 from tests.ui.made import prepare
 from tests.ui.rig import click, still
 
+pytestmark = pytest.mark.one_blender
+
 RISING = {"b0": (-2.5, 0, 0), "b1": (-0.5, 0, -0.1), "b2": (-0.2, 0.3, 0.1), "b3": (2.2, 0, 1.6)}
 HUMP = {"b0": (-3.0, 0, 0), "b1": (-1.0, 0, 2.2), "b2": (1.0, 0, 2.2), "b3": (3.0, 0, 0)}
 

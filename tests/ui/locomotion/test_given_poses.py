@@ -12,6 +12,8 @@ import pytest
 from octo_motion.ui.locomotion.settings import locomotion_settings
 from tests.ui.rig import click, generate, keys
 
+pytestmark = pytest.mark.one_blender
+
 ARM = 0.6
 """Metres that the octopus' arms are long."""
 EXACT = 1e-4

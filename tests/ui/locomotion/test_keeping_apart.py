@@ -16,6 +16,8 @@ from tests.referee.scenes import build
 from tests.ui.made import Made, prepare
 from tests.ui.rig import Octopus, keys
 
+pytestmark = pytest.mark.one_blender
+
 OCTOPUS = Octopus(
     add_on=True,
     setup="walk",

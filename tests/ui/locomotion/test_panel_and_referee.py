@@ -13,6 +13,8 @@ from tests.referee.recording import moments, record
 from tests.referee.scenes import GROUNDS, Scene, build
 from tests.referee.surface import Surface
 
+pytestmark = pytest.mark.one_blender
+
 SCENES = ("walk", "idle", "constrained walk")
 
 

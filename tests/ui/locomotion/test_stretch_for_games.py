@@ -14,6 +14,8 @@ from octo_motion.ui.locomotion.writing import generate_locomotion
 from octo_motion.ui.locomotion.writing.following import Following
 from tests.ui.rig import Octopus, click, generate, joints_in_world, keys, make_octopus
 
+pytestmark = pytest.mark.one_blender
+
 ROUTE = ((0.0, 0.0, 0.0), (0.0, -0.3, 0.0), (0.05, -0.5, 0.0), (0.2, -0.7, 0.0))
 ARM = 1.0
 """Metres that arms are long."""

@@ -16,6 +16,7 @@ from tests.ui.rig import click, joints_in_world, keys
 Data = Callable[[str], Path]
 
 pytestmark = [
+    pytest.mark.one_blender,
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
 ]

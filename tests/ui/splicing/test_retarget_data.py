@@ -13,7 +13,10 @@ import pytest
 from tests.referee.recording import Floats, Integers, moments, record
 
 # Blender's importer leaves the file open.
-pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning"),
+    pytest.mark.one_blender,
+]
 
 SharedData = Callable[[str], Path]
 

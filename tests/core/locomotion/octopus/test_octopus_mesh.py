@@ -18,6 +18,8 @@ from octo_motion.core.locomotion.octopus.shape import OctopusShape
 from octo_motion.core.locomotion.octopus.surface import OctopusMesh, SkinMaterial
 from octo_motion.core.rotations import Floats
 
+pytestmark = pytest.mark.one_blender
+
 SHAPES = {
     "default": OctopusShape(),
     "one arm": OctopusShape(arms=1),
