@@ -571,6 +571,7 @@ class GroundedWalk:
         moments = Moments(
             angles, steering, cycles, since, centres, orientations, to_armature, self._lift(phase)
         )
+        yield from self.laying()
         parts: list[PartPoses] = []
         for number, part in enumerate(self._parts):
             parts.append((yield from part.posing(number, moments, higher, smoothing)))
