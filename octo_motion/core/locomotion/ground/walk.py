@@ -571,7 +571,9 @@ class GroundedWalk:
         moments = Moments(
             angles, steering, cycles, since, centres, orientations, to_armature, self._lift(phase)
         )
-        yield from self.laying()
+        # While they are laid they are looked at themselves, as round arms lie.
+        if not self._found:
+            yield from self.laying()
         parts: list[PartPoses] = []
         for number, part in enumerate(self._parts):
             parts.append((yield from part.posing(number, moments, higher, smoothing)))
