@@ -85,10 +85,6 @@ _SQUARE: Final = float(np.cos(np.radians(45.0)))
 """Cosine of the angle by which their line may be off that of the shoulders: an arm that is up all
 the time on the other side of one that hangs turns the shoulders by 15–27°."""
 
-_ASKEW: Final = np.radians(5.0)
-"""By which shoulders lie off square to the trunk without an arm being up: recorded ones do by 3° to
-4°, those of one person by 7°."""
-
 _LONE: Final = (0.6, 1.4)
 """Difference of two arms' heights, in lengths of an upper arm, from which on the higher one raises
 its shoulder, and at which it does so fully."""
@@ -315,27 +311,20 @@ class ReferenceFinder:
         return _axes(self._collars(chest, self._shoulders(chest, trunk, up)), up)
 
     def _shoulders(self, chest: int, trunk: Floats, up: Floats) -> Floats:
-        """(3,) from right to left shoulder along the chest's axes, as with no arm higher than the
-        other.
-
-        Then they lie square to the neck, for bodies are alike on both sides, where it sits still on
-        the chest; and nearly square to the trunk.
+        """(3,) from right to left shoulder along the chest's axes; where one arm is higher than the
+        other all the time, square to the neck that sits still on the chest, or to the trunk: bodies
+        are alike on both sides.
         """
         left = self._joints("upper_arm.L") - self._joints("upper_arm.R")
         line = robust_direction(self._seen(chest, left), self._standing)
         neck = self._seen(chest, self._top() - self._joints("chest"))
         place, width = np.median(neck, axis=0), float(np.median(lengths(left)))
-        middle, most = up, float(_ASKEW)
-        if lengths(neck - place).max() < _RIGID * width and lengths(place) > _ROOTS[1] * width:
-            middle, most = normalized(place), 0.0
+        still = lengths(neck - place).max() < _RIGID * width
+        middle = normalized(place) if still and lengths(place) > _ROOTS[1] * width else up
         sine = float(line @ middle)
         if sine**2 > 1.0 - _SQUARE**2:
             return line
-        angle = float(np.arcsin(sine))
-        share = self._raises_one_arm(normalized(trunk))
-        wanted = angle - share * (angle - float(np.clip(angle, -most, most)))
-        flat = normalized(line - sine * middle)
-        return np.cos(wanted) * flat + np.sin(wanted) * middle
+        return normalized(line - self._raises_one_arm(normalized(trunk)) * sine * middle)
 
     def _raises_one_arm(self, up: Floats) -> float:
         """From 0 to 1: how much higher one arm is than the other, all in all."""
