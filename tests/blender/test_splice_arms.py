@@ -139,15 +139,16 @@ def test_an_arm_points_from_the_chest_where_it_does_in_its_clip(shared_data: Sha
                 assert off[reached].max(initial=0.0) < 0.02, (name, other, goal)
 
 
-def with_an_arm_up(person: Person) -> Clip:
-    """The same clip with the right arm up all the time, its shoulder raised by 25°."""
+def with_an_arm_up(person: Person, side: str = "R", shoulder: float = 25.0) -> Clip:
+    """The same clip with an arm up all the time, its shoulder raised by so many degrees."""
     clip = person.clip
     skeleton, index = clip.skeleton, clip.skeleton.index
     axes = person.chest(clip, clip.frames)
-    # From the chest to the right and up, and about what points back.
+    sign = 1.0 if side == "R" else -1.0
+    # From the chest to this side and up, and about what points back.
     turns = sample_world(clip, clip.frames)[0]
-    raised = np.einsum("mij,j->mi", axes, np.array([-0.3, 0.0, 1.0]))
-    back = np.einsum("mij,j->mi", axes, np.array([0.0, np.radians(25.0), 0.0]))
+    raised = np.einsum("mij,j->mi", axes, np.array([-0.3 * sign, 0.0, 1.0]))
+    back = np.einsum("mij,j->mi", axes, np.array([0.0, np.radians(shoulder) * sign, 0.0]))
     rotations = clip.rotations.copy()
 
     def turn(landmark: str, by: Floats) -> None:
@@ -157,26 +158,29 @@ def with_an_arm_up(person: Person) -> Clip:
             rotations[:, bone], multiply(conjugate(lay), multiply(by, lay))
         )
 
-    turn("clavicle.R", from_rotation_vector(rotate(conjugate(turns), back)))
+    turn(f"clavicle.{side}", from_rotation_vector(rotate(conjugate(turns), back)))
     heads = skeleton.pose(rotations, clip.locations)[1]
-    arm = (index[person.marks[f"{each}.R"]] for each in ("upper_arm", "forearm"))
+    arm = (index[person.marks[f"{each}.{side}"]] for each in ("upper_arm", "forearm"))
     root, elbow = (heads[:, bone] for bone in arm)
     ways = normalized(elbow - root), normalized(rotate(conjugate(turns), raised))
-    turn("upper_arm.R", shortest_arc(*ways))
+    turn(f"upper_arm.{side}", shortest_arc(*ways))
     return replace(clip, rotations=rotations)
 
 
-def test_an_arm_that_is_up_all_the_time_turns_nothing_else(shared_data: SharedData) -> None:
+@pytest.mark.parametrize(("shoulder", "most"), [(25.0, 8.0), (0.0, 0.01)])
+def test_an_arm_that_is_up_all_the_time_turns_nothing_else(
+    shared_data: SharedData, shoulder: float, most: float
+) -> None:
     # The other arm and the head of one clip onto a base, with an arm hanging and with an arm up.
     found = persons(shared_data)
     for number, ((name, base), (other, person)) in enumerate(permutations(found.items(), 2)):
-        if number % 3:
+        if number % 4:
             continue
         timing = Timing(base.clip.frames[0], person.clip.frames[0])
         seen = ("left_arm", "left_shoulder", "left_elbow"), ("head", "neck", "head")
         for part, start, end in seen:
             ways = []
-            for onto in (base.clip, with_an_arm_up(base)):
+            for onto in (base.clip, with_an_arm_up(base, "R", shoulder)):
                 splice = Splice(PARTS[part], person.clip, timing, person.marks)
                 result = spliced(onto, base.marks, splice)
                 fully = splice_window(timing, onto, person.clip)
@@ -185,5 +189,6 @@ def test_an_arm_that_is_up_all_the_time_turns_nothing_else(shared_data: SharedDa
                 ways.append(joints[end] - joints[start])
             off = angle(*ways)
             # 3.3 to 6.8 where collar bones begin in the middle, 12 and more by the shoulders alone:
-            # those of that person lie as much askew when both arms hang. Elsewhere nothing.
-            assert off.max(initial=0.0) < 8.0, (name, other, part)
+            # those of that person lie as much askew when both arms hang, the left one higher: where
+            # the right one is not raised with its arm, it is believed. Elsewhere nothing.
+            assert off.max(initial=0.0) < most, (name, other, part)

@@ -324,10 +324,12 @@ class ReferenceFinder:
         sine = float(line @ middle)
         if sine**2 > 1.0 - _SQUARE**2:
             return line
-        return normalized(line - self._raises_one_arm(normalized(trunk)) * sine * middle)
+        # No shoulder is lower for an arm that is up.
+        share = max(self._raises_left(normalized(trunk)) * np.sign(sine), 0.0)
+        return normalized(line - share * sine * middle)
 
-    def _raises_one_arm(self, up: Floats) -> float:
-        """From 0 to 1: how much higher one arm is than the other, all in all."""
+    def _raises_left(self, up: Floats) -> float:
+        """From −1 to 1: how much higher the left arm is than the right one, all in all."""
         if not {"forearm.L", "forearm.R"} <= self._bones.keys():
             return 0.0
         heights = [
@@ -335,7 +337,7 @@ class ReferenceFinder:
             for s in "LR"
         ]
         apart = np.average(heights[0] - heights[1], weights=self._standing)
-        return float(_between(np.abs(apart), _LONE))
+        return float(np.copysign(_between(np.abs(apart), _LONE), apart))
 
     def _collars(self, chest: int, shoulders: Floats) -> Floats:
         """(3,) to the left along the chest's axes: by the collar bones' roots, which no shrug
