@@ -145,7 +145,7 @@ def test_collections_sort_the_bones_by_side() -> None:
     assert set(collections) == {"Body", "Eyes", "Arms Left", "Arms Right", "Arms Middle"}
     assert collections["Eyes"] == {"eye.L", "eye.R"}
     assert {"root", "body", "head", "mantle", "siphon"} == collections["Body"]
-    assert collections["Arms Middle"] == {f"arm4.{joint:02}" for joint in range(1, 13)}
+    assert collections["Arms Middle"] == {f"arm1.{joint:02}" for joint in range(1, 13)}
     assert len(collections["Arms Left"]) == len(collections["Arms Right"]) == 36
     assert sum(map(len, collections.values())) == len(armature.data.bones)
     even = new_octopus(with_skin=False)

@@ -138,7 +138,7 @@ def test_it_goes_through_gltf_and_bends_there_as_here(tmp_path: Path, shape: Oct
 
 def turn(armature: Any, angle: float = 0.8) -> None:
     """Turn an arm about the world's axis: files of other programs have axes of their own."""
-    bone = armature.pose.bones["arm1.01.L"]
+    bone = armature.pose.bones["arm2.01.L"]
     bone.matrix_basis = Matrix()
     bpy.context.view_layer.update()
     world = armature.matrix_world @ bone.matrix

@@ -20,6 +20,7 @@ from ...core.locomotion.rig import ArmSkin, arm_skin, joint_positions, nearest_b
 from ...core.phrases import phrase
 from ...core.rotations import Floats
 from ...core.skeleton import Skeleton, without_made_up_scale
+from ...core.smoothing import smooth_step
 from .. import versions
 
 SUCKER_PROPERTY = "octo_motion_sucker"
@@ -567,6 +568,17 @@ _FEW: Final = 4
 """Vertices of a bone that do not yet tell its thickness."""
 _MOST: Final = 0.75
 """Share of a bone's vertices that lie within its radius: suckers stand out a little."""
+_MOST_OF_SIDE: Final = 0.95
+"""The same of how far they lie to the sides."""
+_NEAR: Final = 0.2
+"""Share of a part's vertices that tell how thick it is somewhere along it."""
+_TIMES: Final = 3
+"""How often it is looked how thick it is where it ends, and where it ends as it is so thick."""
+_LAST: Final = 0.05
+"""Share of a part's vertices that tell whether its end is round …"""
+_ROUND: Final = 0.4, 0.3
+"""… as it is where they are nearer to its axis than that share of its radius, and not where they
+are farther by the next: of a ball they are at 0.31."""
 _REACHED: Final = 0.02
 """Share of a part's vertices at either end that stand out of it."""
 _MUCH: Final = 1.5
@@ -686,24 +698,44 @@ def skin_parts(
         own = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0]
         along = (tail - head) / max(float(np.linalg.norm(tail - head)), 1e-12)
         part, other = _part(points, head, along), _part(points, middle, own)
-        ends, radius = part if _volume(*part) <= _MUCH * _volume(*other) else other
-        parts.append((name, ends, np.full(2, radius)))
+        parts.append((name, *(part if _volume(*part) <= _MUCH * _volume(*other) else other)))
     return parts
 
 
-def _part(points: Floats, start: Floats, along: Floats) -> tuple[Floats, float]:
-    """Ends (2, 3) and radius of the capsule about a line that points (n, 3) lie round."""
+def _part(points: Floats, start: Floats, along: Floats) -> tuple[Floats, Floats]:
+    """Joints (4, 3) and radii (4,) of capsules about a line that points (n, 3) lie round: up one
+    side, across, and down the other side, as far from each other as the part is wider than deep.
+    """
     seen = points - start
     height = seen @ along
-    radius = float(np.quantile(np.linalg.norm(seen - height[:, None] * along, axis=1), _MOST))
+    across = seen - height[:, None] * along
+    wide = np.linalg.svd(across, full_matrices=False)[2][0]
+    sides = np.abs(np.stack([across @ wide, across @ np.cross(along, wide)]))
+    away = np.linalg.norm(across, axis=1)
+    radius = float(np.quantile(away, _MOST))
     low, high = np.quantile(height, [_REACHED, 1.0 - _REACHED])
-    middle = 0.5 * (low + high)
-    reached = np.array([min(low + radius, middle), max(high - radius, middle)])
-    return start + reached[:, None] * along, radius
+    some, few = (max(_FEW, round(share * len(points))) for share in (_NEAR, _LAST))
+    order, left, right, radii = np.argsort(height), [], [], []
+    for end, inwards, last in ((low, 1.0, order[:few]), (high, -1.0, order[-few:])):
+        # As far from its end as it is thick there, and half as far where that is open and the
+        # body goes on in another part; but not beyond the middle.
+        share = np.array(np.median(away[last]) / max(radius, 1e-12))
+        inside = 1.0 - 0.5 * float(smooth_step((share - _ROUND[0]) / _ROUND[1]))
+        half, at = np.full(2, radius), end
+        for _ in range(_TIMES):
+            at = end + inwards * min(inside * float(half.min()), 0.5 * (high - low))
+            near = np.argsort(np.abs(height - at))[:some]
+            half = np.quantile(sides[:, near], _MOST_OF_SIDE, axis=1)
+        shift = (half[0] - half.min()) * wide
+        left.append(start + at * along - shift)
+        right.append(start + at * along + shift)
+        radii.append(float(half.min()))
+    return np.array([*left, *reversed(right)]), np.array([*radii, *reversed(radii)])
 
 
-def _volume(ends: Floats, radius: float) -> float:
-    length = float(np.linalg.norm(ends[1] - ends[0]))
+def _volume(joints: Floats, radii: Floats) -> float:
+    radius = float(radii.mean() + 0.25 * np.linalg.norm(joints[1] - joints[2]))
+    length = float(np.linalg.norm(joints[1] - joints[0]))
     return radius * radius * (length + 4.0 / 3.0 * radius)
 
 

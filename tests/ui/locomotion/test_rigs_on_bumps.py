@@ -123,13 +123,14 @@ def test_rigs_of_artists_go_over_bumps(
     hold_up(found, slip={"hurry": 0.011, "tiptoe": 0.005}.get(setup, 0.0025))
 
 
-def test_on_six_arms_too_the_rear_pair_tiptoes() -> None:
-    armature = rig([(0.1,) * 10] * 6, 0.0)
+@pytest.mark.parametrize("arms", [6, 10])
+def test_however_many_arms_there_are_the_rear_pair_tiptoes(arms: int) -> None:
+    armature = rig([(0.1,) * 10] * arms, 0.0)
     figures_on_bumps(armature, "tiptoe")
     shot = prepare(armature, bpy.context)
     assert shot.standing is not None
-    arms = {shot.arms[each.arm].pair for each in shot.standing.walk.footholds()}
-    assert arms == {3}
+    pairs = {shot.arms[each.arm].pair for each in shot.standing.walk.footholds()}
+    assert pairs == {arms // 2}
 
 
 def test_what_is_told_of_arms_that_cannot_stretch_helps_them() -> None:

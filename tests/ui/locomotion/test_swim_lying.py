@@ -106,7 +106,7 @@ def test_a_rig_that_lies_trails_its_arms_and_turns_none_at_a_stroke(
     assert steps(shot.rotations).max() < 16.0
     volume = shot.shot.job.volume
     assert volume is not None
-    alone = replace(volume, still=())
+    alone = replace(volume, body=())
     found, _ = alone.measure(shot.rotations, shot.strains)
     assert found.worst is None or found.worst.depth < 0.2
     assert prepare(armature, bpy.context).mantle == ()

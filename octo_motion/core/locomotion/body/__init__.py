@@ -12,7 +12,7 @@ from .by_itself import (
     steps_of,
     surge,
 )
-from .organs import BodyMoments, OrganPoses, Organs, find_organs, pose_organs
+from .organs import BodyMoments, OrganPoses, Organs, carriages, find_organs, pose_organs
 
 __all__ = [
     "BodyMoments",
@@ -24,6 +24,7 @@ __all__ = [
     "SelfMotion",
     "Stalking",
     "Surge",
+    "carriages",
     "find_organs",
     "pose_organs",
     "self_motion",

@@ -511,6 +511,11 @@ class SelfMotion:
     """(n, 3) arm lengths per second: where it goes, without the hurry of each push, as the armature
     has it."""
 
+    @property
+    def widest(self) -> float:
+        """How many times as wide as at rest the mantle is at most, 1 at least."""
+        return 1.0 + max(float(self.filled.max(initial=0.0)), 0.0)
+
     def at(self, table: Floats, times: Floats) -> Floats:
         """A table (n, …) at times (moments,), seconds."""
         place = np.clip(times / self.track.step, 0.0, len(table) - 1.0)

@@ -6,7 +6,7 @@ of the body's own motion each of them gets.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,7 +14,15 @@ import numpy as np
 
 from ...errors import RigError
 from ...phrases import phrase
-from ...rotations import Floats, conjugate, from_rotation_vector, multiply, normalized, rotate
+from ...rotations import (
+    IDENTITY,
+    Floats,
+    conjugate,
+    from_rotation_vector,
+    multiply,
+    normalized,
+    rotate,
+)
 from ...skeleton import Skeleton
 from ...smoothing import smooth_step
 from ..rig import BodyFrame, find_mantle
@@ -224,6 +232,11 @@ class OrganPoses:
     scales: dict[str, Floats]
     """(moments, 3) of those that may get wider or narrower."""
 
+    def at(self, part: slice) -> OrganPoses:
+        """The same at some of the moments."""
+        scales = {name: each[part] for name, each in self.scales.items()}
+        return OrganPoses(self.bones, self.rotations[part], scales)
+
 
 def pose_organs(
     motion: SelfMotion, organs: Organs, skeleton: Skeleton, up: Floats, moments: BodyMoments
@@ -249,6 +262,34 @@ def pose_organs(
         np.stack(rotations, axis=1) if rotations else np.zeros((count, 0, 4)),
         dict(posing.scales()),
     )
+
+
+def carriages(
+    organs: OrganPoses, skeleton: Skeleton, names: Iterable[str]
+) -> dict[str, tuple[Floats, Floats]]:
+    """How bones of the body are taken along, from rest, armature space: turns (moments, 4) about
+    its origin, and shifts (moments, 3) after these. Breath widens, and takes nothing along.
+    """
+    count = len(organs.rotations)
+    own = dict(zip(organs.bones, np.moveaxis(organs.rotations, 1, 0), strict=True))
+    at_rest = np.broadcast_to(IDENTITY, (count, 4)), np.zeros((count, 3))
+    known: dict[int, tuple[Floats, Floats]] = {-1: at_rest}
+
+    def carriage(bone: int) -> tuple[Floats, Floats]:
+        if bone not in known:
+            turns, shifts = above = carriage(skeleton.parents[bone])
+            inherits, rotations = skeleton.inherits_rotation[bone], own.get(skeleton.names[bone])
+            if not inherits or rotations is not None:
+                head, rest = skeleton.heads[bone], skeleton.rest_rotations[bone]
+                at = rotate(turns, head) + shifts
+                turns = turns if inherits else at_rest[0]
+                if rotations is not None:
+                    turns = multiply(turns, multiply(multiply(rest, rotations), conjugate(rest)))
+                above = turns, at - rotate(turns, head)
+            known[bone] = above
+        return known[bone]
+
+    return {name: carriage(skeleton.index[name]) for name in names}
 
 
 _ALONG: Final = np.array([0.0, 1.0, 0.0])

@@ -85,20 +85,20 @@ class Separation:
         return self.overlaps[0] if self.overlaps else None
 
 
-def measure_overlap(chains: Sequence[Capsules], still: Sequence[Capsules] = ()) -> Separation:
+def measure_overlap(chains: Sequence[Capsules], body: Sequence[Capsules] = ()) -> Separation:
     """How far chains pass through each other, as :func:`measuring_overlap` finds."""
-    return finished(measuring_overlap(chains, still))
+    return finished(measuring_overlap(chains, body))
 
 
 def measuring_overlap(
-    chains: Sequence[Capsules], still: Sequence[Capsules] = ()
+    chains: Sequence[Capsules], body: Sequence[Capsules] = ()
 ) -> Generator[None, None, Separation]:
     """How far chains, the arms, pass through each other and through parts of the body; in steps.
 
     Neighbouring capsules of one chain are joined; a chain is not measured against itself, nor parts
     against each other.
     """
-    every = [*chains, *still]
+    every = [*chains, *body]
     if not chains:
         return Separation(np.zeros(0), ())
     parts = parts_of(every)
@@ -475,21 +475,21 @@ class Touches:
 
 
 class Touching:
-    """The capsules of arms and of parts of the body, one frame each, that are so near to each other
-    that they touch, or may have to make way, at all frames.
+    """The capsules of arms and of parts of the body, for one frame or for all, that are so near to
+    each other that they touch, or may have to make way, at all frames.
 
     Which these are is looked up once and holds for a while (Verlet, Physical Review 159, 1967, 98):
     with some slack for those that move, and anew at frames at which a joint has moved by half of
     that. So what an arm comes near to as it makes way counts as what it was near to before.
     """
 
-    def __init__(self, crowd: Crowd, still: Sequence[Capsules]) -> None:
+    def __init__(self, crowd: Crowd, body: Sequence[Capsules]) -> None:
         frames, arms, joints, _ = crowd.joints.shape
-        self._crowd, self._still = crowd, still
+        self._crowd, self._body = crowd, body
         self._arms, self._joints = arms, joints
         parts = self._parts(crowd.joints)
         self._radii, self._owner = parts.radii, parts.owner
-        places = _places(crowd, len(still))
+        places = _places(crowd, len(body))
         self._sides = _sides(places)
         self._apart: Floats | None = None
         if crowd.opened is not None:
@@ -499,8 +499,9 @@ class Touching:
         each = joints - 1
         own = arms * each
         # Points of the body after those of all arms: where a capsule starts and, next, ends.
-        body = np.stack([parts.starts[:, 0, own:], parts.ends[:, 0, own:]], axis=2)
-        self._body = body.reshape(3, -1)
+        many = max([len(part.joints) for part in body], default=1)
+        ends = np.stack([parts.starts[:, :many, own:], parts.ends[:, :many, own:]], axis=3)
+        self._body_points = ends.reshape(3, -1)
         # Where each capsule starts among the points of the first frame, and how many are between
         # frames: of each arm there is a joint more than there are segments.
         number = np.arange(len(self._owner))
@@ -509,8 +510,9 @@ class Touching:
             number + number // each,
             frames * arms * joints + 2 * (number - own),
         )
-        self._step = np.where(number < own, arms * joints, 0)
-        self._pairs = pairs_of([*self._chains(crowd.joints[:1]), *still], arms)
+        between = 2 * (len(number) - own) if many > 1 else 0
+        self._step = np.where(number < own, arms * joints, between)
+        self._pairs = pairs_of([*self._chains(crowd.joints[:1]), *body], arms)
         self._slack = _SLACK * float(crowd.radii.mean())
         self._seen_at = crowd.joints
         self._watched = np.zeros(frames, dtype=bool)
@@ -533,7 +535,7 @@ class Touching:
                 each.radii,
                 each.at_rest,
             )
-            for each in self._still
+            for each in self._body
         ]
         return parts_of([*self._chains(joints), *body])
 
@@ -571,7 +573,7 @@ class Touching:
         """Frame, the one and the other (3, n) of what is near to arms (frames, arms) where joints
         were seen, a piece at a time.
         """
-        asked = np.zeros((len(anew), self._arms + len(self._still)), dtype=bool)
+        asked = np.zeros((len(anew), self._arms + len(self._body)), dtype=bool)
         asked[:, : self._arms] = anew
         points = self._points(self._seen_at)
 
@@ -616,7 +618,7 @@ class Touching:
         self._seen_at[anew] = joints[anew]
         self._middles = Middles.of(self._parts(self._seen_at))
         frame, one, other = self._rows
-        moving = np.zeros((len(anew), self._arms + len(self._still)), dtype=bool)
+        moving = np.zeros((len(anew), self._arms + len(self._body)), dtype=bool)
         moving[:, : self._arms] = anew
         kept = ~(moving[frame, self._owner[one]] | moving[frame, self._owner[other]])
         found = [self._rows[:, kept]]
@@ -656,7 +658,7 @@ class Touching:
 
     def _points(self, joints: Floats) -> Floats:
         """(3, points) where capsules start and end: joints (frames, arms, joints, 3), the body."""
-        return np.concatenate([joints.reshape(-1, 3).T, self._body], axis=1)
+        return np.concatenate([joints.reshape(-1, 3).T, self._body_points], axis=1)
 
     def _starts(self, rows: np.ndarray, which: int) -> np.ndarray:
         """Which points the one or the other start at; the ones after these are their ends."""

@@ -5,8 +5,8 @@ and where they go over to either.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Final
@@ -122,7 +122,7 @@ def separating_arms(
     yield 0.0
     moved = yield from parting(
         crowd.crowd,
-        volume.still,
+        volume.body,
         floor=_floor(travel, ground, scale),
         width=width_of(frames_per_cycle),
         most=most,
@@ -165,7 +165,7 @@ def lead_past(
     passing = Passing(share, holds, crowd.crowd.in_contact.argmax(axis=2))
     moved = led_past(
         crowd.crowd,
-        volume.still,
+        volume.body,
         passing,
         _floor(travel, ground, scale),
         width=width_of(frames_per_cycle),
@@ -336,14 +336,31 @@ class BodyVolume:
     names: tuple[str, ...]
     radii: tuple[Floats, ...]
     """Of each arm (bones + 1,) at its joints, armature units."""
-    still: tuple[Capsules, ...]
-    """Parts of the body, one frame each."""
+    body: tuple[Capsules, ...]
+    """Parts of the body, by their bones: one frame each, or as many as are asked of the arms."""
     upward: Floats
     """(3,) unit: the body's, armature space."""
 
+    def carried(
+        self, carriages: Mapping[str, tuple[Floats, Floats]], wider: Mapping[str, float]
+    ) -> BodyVolume:
+        """The same whose body moves as its bones do, by their names: turns (frames, 4) from rest
+        about the origin, and shifts (frames, 3) after these; and some are so much wider.
+        """
+        body = [
+            replace(
+                each,
+                joints=rotate(turns[:, None], each.at_rest) + shifts[:, None],
+                radii=wider.get(each.name, 1.0) * each.radii,
+            )
+            for each in self.body
+            for turns, shifts in [carriages[each.name]]
+        ]
+        return replace(self, body=tuple(body))
+
     def _distances(self, frames: int) -> int:
         """How many there are to be looked at over so many frames."""
-        capsules = sum(min(len(arm.bones), MOST_CAPSULES) for arm in self.arms) + len(self.still)
+        capsules = sum(min(len(arm.bones), MOST_CAPSULES) for arm in self.arms) + len(self.body)
         return frames * capsules * capsules
 
     def too_many(self, frames: int) -> str:
@@ -381,11 +398,12 @@ class BodyVolume:
             radii = self.radii[number][some]
             chains.append(Capsules(self.names[number], joints[:, some], radii, rest[some]))
             yield
-        still = [
-            Capsules(each.name, np.tile(each.joints, (len(looked), 1, 1)), each.radii, each.at_rest)
-            for each in self.still
+        body = [
+            replace(each, joints=np.broadcast_to(joints, (len(looked), *joints.shape[1:])))
+            for each in self.body
+            for joints in [each.joints[:: every if len(each.joints) > 1 else 1]]
         ]
-        return (yield from measuring_overlap(chains, still)), every
+        return (yield from measuring_overlap(chains, body)), every
 
     @staticmethod
     def told(found: Separation, every: int, frames: Floats) -> tuple[str, ...]:

@@ -155,7 +155,7 @@ class Floor(Protocol):
 
 def parting(
     crowd: Crowd,
-    still: Sequence[Capsules],
+    body: Sequence[Capsules],
     *,
     floor: Floor | None,
     width: int,
@@ -166,7 +166,7 @@ def parting(
     that yield the share that is done.
 
     The result at a frame hangs on the frames within some reach of it, and on no state: the same
-    motion gives the same result. Parts of the body that are ``still`` have one frame each;
+    motion gives the same result. Parts of the body have one frame, or one for each of the arms';
     ``width`` is that of the means over frames that make it smooth (``smoothing.blurred``); nobody
     makes way by turns of more than ``most`` radians in a frame, or than there were before. Cyclic,
     the last frame is the first again.
@@ -174,7 +174,7 @@ def parting(
     every = np.arange(len(crowd.joints))
     if not len(every):
         return None
-    touching = Touching(crowd, still)
+    touching = Touching(crowd, body)
     yield 0.0
     touches = yield from touching.seeing()
     yield 0.0

@@ -57,7 +57,7 @@ class Passing:
 
 def led_past(
     crowd: Crowd,
-    still: Sequence[Capsules],
+    body: Sequence[Capsules],
     passing: Passing,
     floor: Floor | None,
     *,
@@ -65,12 +65,12 @@ def led_past(
 ) -> Floats | None:
     """Joints (frames, arms, joints, 3) where arms that reach keep clear; none if all do anyway.
 
-    Parts of the body that are ``still`` have one frame each.
+    Parts of the body have one frame, or one for each of the arms'.
     """
     items = np.nonzero(passing.share > 0.0)
     if not len(items[0]):
         return None
-    touching = Touching(crowd, still)
+    touching = Touching(crowd, body)
     watched = (passing.share > 0.0).any(axis=1)
     finished(touching.looking_at(watched, np.zeros(0, dtype=np.intp)))
     rod = _Rods.of(crowd, passing, items)

@@ -16,9 +16,10 @@ import numpy as np
 from ...keyframes import Channel
 from ...phrases import phrase
 from ...rotations import IDENTITY, Floats, conjugate, from_matrix, multiply, rotate, slerp
-from ..body import BodyMoments, OrganPoses, pose_organs
+from ..body import BodyMoments, OrganPoses, carriages, pose_organs
 from ..clearance import (
     ArmsOverGround,
+    BodyVolume,
     Opened,
     keep_off_ground,
     lead_past,
@@ -203,7 +204,6 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
         _hand_over(plan, posed)
     yield moving
     arms, keyed, reached = posed.arms, posed.keyed, posed.reached
-    warnings = [*plan.warnings, *posed.warnings]
     organs = organs_at(plan, moments, keyed, posed.swimming)
     yield moving
     motion, further = _motion(plan, posed, moments, organs)
@@ -212,7 +212,8 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     # The ground is as it was planned on.
     planned, along = posed.planned or (arms, posed.going)
     framed, stays = ((each[0][on_frames], each[1][on_frames]) for each in (along, keyed))
-    measuring = _measuring(plan, planned.at(on_frames), framed, stays, posed.turning)
+    played = planned.at(on_frames), framed, stays, _volume(plan, organs.at(on_frames))
+    measuring = _measuring(plan, *played, turning=posed.turning)
     measured, overlaps = yield from scaled(measuring, moving, moving)
     if measured is not None and plan.carry is not None:
         measured = _rolled_up(plan, measured, posed)
@@ -229,6 +230,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     yield 1.0
     # What is in a pose alone is on each frame, however few keys the motion has.
     further = [replace(each, values=each.values[::every]) for each in further]
+    warnings = *plan.warnings, *posed.warnings, *warnings_for_misses(plan, arms.at(on_frames))
     result = MotionResult(
         plan=plan,
         channels=plan.job.creature.channels.written([*channels, *further]),
@@ -238,7 +240,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
         carried=reached.carried if reached is not None else (),
         measured=measured,
         figures=found,
-        warnings=(*warnings, *warnings_for_misses(plan, arms.at(on_frames)), *overlaps),
+        warnings=(*warnings, *overlaps),
         notes=reached.notes if reached is not None else (),
     )
     yield 1.0
@@ -341,10 +343,13 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     arms = yield from scaled(_clearing(plan, made, going, cyclic=cyclic), 0.9, 0.9)
     yield 0.93
     swimming = segments.swimming(travel.distance)
+    frames = np.interp(times, plan.schedule.times, plan.schedule.frames)
+    volume = _volume(plan, organs_at(plan, frames, keyed, swimming))
+    yield 0.94
     # What is reached for is in the world.
-    reached = _reach(plan, arms, keyed, going) if plan.carry is None else None
+    reached = _reach(plan, arms, volume, keyed, going) if plan.carry is None else None
     yield 0.96
-    making_way = _separate(plan, arms, reached, going, swimming=swimming, cyclic=cyclic)
+    making_way = _separate(plan, arms, reached, going, volume, swimming=swimming, cyclic=cyclic)
     warnings = yield from scaled(making_way, 0.96, 0.98)
     yield 0.98
     turning = _take_time(plan, arms, reached, going, cyclic=cyclic)
@@ -355,7 +360,7 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     if plan.carry is not None:
         planned, arms = (arms, going), arms.copy()
         going = keyed = _carried(plan, plan.carry, arms, going, (travel.distance, times))
-        reached = _reach(plan, arms, keyed, going)
+        reached = _reach(plan, arms, volume, keyed, going)
         eased = _body_of(creature, going)
         eased = eased_places(hands, creature.body, creature.scale, eased)
     else:
@@ -595,7 +600,24 @@ def _clearing(
     return arms
 
 
-def _reach(plan: MotionPlan, arms: ArmMotion, keyed: Travelled, going: Travelled) -> Reached | None:
+def _volume(plan: MotionPlan, organs: OrganPoses) -> BodyVolume | None:
+    """How much room arms and body take as the body moves by itself; none where nobody asks."""
+    volume, moving = plan.job.volume, plan.self_motion
+    if volume is None or moving is None:
+        return volume
+    names = [each.name for each in volume.body]
+    # As wide as it ever gets: what arms do at a moment does not hang on which others are asked.
+    wider = dict.fromkeys(plan.job.body.organs.mantle[-1:], moving.widest)
+    return volume.carried(carriages(organs, plan.job.creature.skeleton, names), wider)
+
+
+def _reach(
+    plan: MotionPlan,
+    arms: ArmMotion,
+    volume: BodyVolume | None,
+    keyed: Travelled,
+    going: Travelled,
+) -> Reached | None:
     """Let arms reach, past each other and the ground; none where nothing is reached for.
 
     Arms which reach hold no ground and follow no gait.
@@ -606,7 +628,7 @@ def _reach(plan: MotionPlan, arms: ArmMotion, keyed: Travelled, going: Travelled
     before = arms.rotations.copy()
     travelling = Travelling(*keyed, creature.scale)
     reached = reaching.apply(plan.schedule.frames, arms.rotations, travelling, arms.strains)
-    _led_past(plan, arms, reached, going)
+    _led_past(plan, arms, reached, volume, going)
     moved = np.any(arms.rotations != before, axis=-1)
     for number, bones in enumerate(plan.segments.bones_of):
         own = moved[:, bones]
@@ -616,13 +638,19 @@ def _reach(plan: MotionPlan, arms: ArmMotion, keyed: Travelled, going: Travelled
     return reached
 
 
-def _led_past(plan: MotionPlan, arms: ArmMotion, reached: Reached, going: Travelled) -> None:
+def _led_past(
+    plan: MotionPlan,
+    arms: ArmMotion,
+    reached: Reached,
+    volume: BodyVolume | None,
+    going: Travelled,
+) -> None:
     """Lead arms that reach past the others, and over the ground."""
     job, scale = plan.job, plan.job.creature.scale
     ground = _ground(plan) if plan.carry is None else None
-    if job.volume is not None and job.keep_apart:
+    if volume is not None and job.keep_apart:
         past = lead_past(
-            job.volume,
+            volume,
             arms.rotations,
             arms.strains,
             share=reached.led,
@@ -646,12 +674,13 @@ def _separate(
     arms: ArmMotion,
     reached: Reached | None,
     going: Travelled,
+    volume: BodyVolume | None,
     *,
     swimming: Floats | None,
     cyclic: bool,
 ) -> Steps[list[str]]:
     """Let arms make way for each other, but for those that reach; what there is to warn of."""
-    job, volume = plan.job, plan.job.volume
+    job = plan.job
     if volume is None or not job.keep_apart:
         return []
     if too_many := volume.too_many(len(arms.rotations)):
@@ -761,15 +790,21 @@ def _opened(plan: MotionPlan, count: int, swimming: Floats | None) -> Opened | N
 
 
 def _measuring(
-    plan: MotionPlan, arms: ArmMotion, going: Travelled, keyed: Travelled, turning: Floats | None
+    plan: MotionPlan,
+    arms: ArmMotion,
+    going: Travelled,
+    keyed: Travelled,
+    volume: BodyVolume | None,
+    *,
+    turning: Floats | None,
 ) -> Generator[None, None, tuple[Measured | None, tuple[str, ...]]]:
     """In steps, what figures are taken from, where they are wanted, and what overlaps in words."""
     job, creature, separation, every = plan.job, plan.job.creature, None, 1
     overlaps: tuple[str, ...] = ()
-    if job.volume is not None and job.tell_overlaps:
-        separation, every = yield from job.volume.measuring(arms.rotations, arms.strains)
+    if volume is not None and job.tell_overlaps:
+        separation, every = yield from volume.measuring(arms.rotations, arms.strains)
         yield
-        overlaps = job.volume.told(separation, every, plan.schedule.frames)
+        overlaps = volume.told(separation, every, plan.schedule.frames)
     if job.live:
         return None, overlaps
     yield

@@ -48,8 +48,9 @@ def build_mesh(shape: OctopusShape) -> OctopusMesh:
 
     wanted = add_head_details(surface, form, upper, above)
     surface.add_quads(sheet_quads(closed(above))[wanted], SkinMaterial.SKIN)
-    _add_mantle_end(surface, form, above[0])
-    _add_mouth(surface, lower.points[0], below[0])
+    # Both begin in front.
+    _add_mantle_end(surface, form, np.roll(above[0], -upper.front))
+    _add_mouth(surface, *(np.roll(each[0], -lower.front, axis=0) for each in (lower.points, below)))
     _add_underside(surface, layout, lower, below)
     margins = (
         _between(layout, _by_arm(above[-1], upper)),

@@ -66,19 +66,21 @@ def add_head_details(
     wanted = np.ones((len(vertices) - 1, count), dtype=bool)
     normals = _normals(sheet.points)
 
-    middle = round(EYE_ANGLE * count / math.tau)
+    front = sheet.front
+    middle = front + round(EYE_ANGLE * count / math.tau)
     rows, columns = _patch(sheet.points, EYE_STATION, middle, _EYE_PATCH * form.eye_radius)
     loop = patch_border(vertices[np.ix_(rows, columns)])
     around = _border(sheet, normals, rows, columns)
     _add_eye(surface, form, loop, around, len(rows) - 1, bone=EYE_LEFT)
     with surface.mirrored():
         # The right eye's vertices, in the order of the left eye's.
-        other = patch_border(vertices[np.ix_(rows, -columns % count)])
+        other = patch_border(vertices[np.ix_(rows, (2 * front - columns) % count)])
         _add_eye(surface, form, other, around, len(rows) - 1, bone=EYE_RIGHT)
     wanted[np.ix_(rows[:-1], columns[:-1])] = False
-    wanted[np.ix_(rows[:-1], -columns[1:] % count)] = False
+    wanted[np.ix_(rows[:-1], (2 * front - columns[1:]) % count)] = False
 
-    rows, columns = _patch(sheet.points, SIPHON_STATION, count // 2, _SIPHON_PATCH * form.unit)
+    behind, reach = front + count // 2, _SIPHON_PATCH * form.unit
+    rows, columns = _patch(sheet.points, SIPHON_STATION, behind, reach)
     loop = patch_border(vertices[np.ix_(rows, columns)])
     around = _border(sheet, normals, rows, columns)
     _add_siphon(surface, form, loop, around, len(rows) - 1)

@@ -56,14 +56,14 @@ class OctopusBones:
 def arm_pairs(arms: int) -> tuple[tuple[int, str], ...]:
     """Pair number and side ("L", "R" or "") of each arm, in the order of their angles.
 
-    Pairs count from 1 at the front. An odd arm lies on the plane of symmetry, at the back, and
-    has the last number and no side.
+    Pairs count from 1 at the front. An odd arm lies on the plane of symmetry, in front, and has the
+    first number and no side.
     """
-    middle = arms // 2 if arms % 2 else -1
-    return tuple(
-        (arm + 1, "") if arm == middle else (arm + 1, "L") if arm < arms / 2 else (arms - arm, "R")
-        for arm in range(arms)
-    )
+    odd = arms % 2
+    middle = [(1, "")] if odd else []
+    numbers = range(1 + odd, arms // 2 + odd + 1)
+    left, right = ([(pair, side) for pair in numbers] for side in "LR")
+    return (*middle, *left, *reversed(right))
 
 
 def arm_bone_names(arms: int, joints: int) -> tuple[tuple[str, ...], ...]:

@@ -94,8 +94,13 @@ class OctopusShape:
 
     @cached_property
     def angles(self) -> Floats:
-        """Directions of the arms, (arms,): radians from the front (−Y) towards the left (+X)."""
-        return (np.arange(float(self.arms)) + 0.5) * (2.0 * math.pi / self.arms)
+        """Directions of the arms, (arms,): radians from the front (−Y) towards the left (+X).
+
+        Of arms of an odd number the one in the middle is in front: behind, between two of them, are
+        the mantle and the siphon. One alone is there itself.
+        """
+        first = 0.0 if self.arms % 2 and self.arms > 1 else 0.5
+        return (np.arange(float(self.arms)) + first) * (2.0 * math.pi / self.arms)
 
     @cached_property
     def half_sector(self) -> float:

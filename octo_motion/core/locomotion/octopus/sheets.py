@@ -205,6 +205,14 @@ class Sheet:
         """First column of a sector that belongs to the arm."""
         return (self.sector - self.arm_columns) // 2
 
+    @property
+    def front(self) -> int:
+        """The column on the plane of symmetry in front: between two arms, or in the middle of the
+        first of an odd number.
+        """
+        arms = self.points.shape[1] // self.sector
+        return self.sector // 2 if arms % 2 and arms > 1 else 0
+
 
 @dataclass(frozen=True)
 class _Sector:
@@ -230,7 +238,7 @@ def upper_sheet(layout: ArmLayout, form: BodyForm) -> Sheet:
     shape, columns = layout.shape, layout.columns
     unit = form.unit
     sector_columns = columns.web + columns.dorsal
-    round_head = column_angles(shape.arms * sector_columns)
+    round_head = column_angles(shape.arms * sector_columns, _first_column(shape))
     polar = np.linspace(END_POLAR, 0.5 * math.pi, END_ROWS, endpoint=False)
     stations = np.linspace(MANTLE_WIDEST, HEAD_BASE, HEAD_ROWS)
     crown = unit * (np.linspace(_CROWN_START, 1.0, _CROWN_ROWS, endpoint=False) - 1.0)
@@ -285,9 +293,16 @@ def lower_sheet(layout: ArmLayout, form: BodyForm) -> Sheet:
     return Sheet(points, influences, distance, columns.web + columns.ventral, columns.ventral)
 
 
-def column_angles(columns: int) -> Floats:
-    """Angles (columns,) of evenly spread columns, from the front towards the left."""
-    return np.arange(float(columns)) * (2.0 * math.pi / columns)
+def column_angles(columns: int, first: float = 0.0) -> Floats:
+    """Angles (columns,) of evenly spread columns, from the front towards the left, where the first
+    one is given.
+    """
+    return first + np.arange(float(columns)) * (2.0 * math.pi / columns)
+
+
+def _first_column(shape: OctopusShape) -> float:
+    """Where columns begin: half way from the last arm to the first, radians from the front."""
+    return float(shape.angles[0]) - shape.half_sector
 
 
 def _arms_and_web(layout: ArmLayout, distance: Floats, *, upper: bool) -> _Sector:

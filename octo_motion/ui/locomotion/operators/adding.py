@@ -48,7 +48,7 @@ class OCTO_MOTION_OT_add_octopus(OctoOperator, AddObjectHelper, bpy.types.Operat
     arms: IntProperty(
         name="Arms",
         description=(
-            "Number of arms, evenly spread. Pairs count from the front; an odd arm is at the back"
+            "Number of arms, evenly spread. Pairs count from the front; an odd arm is in front"
         ),
         default=_DEFAULT.arms,
         min=ARMS[0],

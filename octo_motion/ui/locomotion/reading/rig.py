@@ -526,13 +526,13 @@ def _read_volume(
         and limbs.isdisjoint([number, *skeleton.ancestors(number)])
     ]
     radii = radii_of_skin(armature, [arm.bones for arm in arms])
-    still = [
+    parts_of_body = [
         Capsules(name, ends[None], thick, ends) for name, ends, thick in skin_parts(armature, parts)
     ]
     return BodyVolume(
         arms=tuple(frames_of_arm(skeleton, arm.bones, body) for arm in arms),
         names=tuple(arm.name for arm in arms),
         radii=tuple(radii),
-        still=tuple(still),
+        body=tuple(parts_of_body),
         upward=body.rotation[:, 2],
     )

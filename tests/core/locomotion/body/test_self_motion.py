@@ -10,7 +10,9 @@ from octo_motion.core.errors import RigError, SettingsError
 from octo_motion.core.locomotion.body import (
     BodySettings,
     BodyTrack,
+    OrganPoses,
     SelfMotion,
+    carriages,
     find_organs,
     self_motion,
     steps_of,
@@ -18,6 +20,7 @@ from octo_motion.core.locomotion.body import (
 from octo_motion.core.locomotion.body.by_itself import sprung
 from octo_motion.core.locomotion.octopus import OctopusShape, build_bones
 from octo_motion.core.locomotion.rig import BodyFrame, body_frame
+from octo_motion.core.rotations import conjugate, multiply, rotate
 from octo_motion.core.skeleton import Skeleton
 
 ALL = BodySettings(surge=1.0, mantle=1.0, siphon=1.0, eyes=1.0, head=1.0)
@@ -209,3 +212,22 @@ def test_what_is_given_by_hand_counts() -> None:
     assert found == type(found)(("head",), "", ("eye.R",))
     with pytest.raises(RigError, match="no bone 'Fin'"):
         find_organs(skeleton, arms, body, siphon="Fin")
+
+
+def test_parts_of_a_body_are_where_the_bones_that_carry_them_are() -> None:
+    skeleton, _ = octopus()
+    generator = np.random.default_rng(3)
+    turned = ("head", "mantle", "siphon")
+    rotations = generator.normal(size=(5, len(turned), 4))
+    rotations /= np.linalg.norm(rotations, axis=-1, keepdims=True)
+    found = carriages(OrganPoses(turned, rotations, {}), skeleton, [*turned, "eye.L", "body"])
+    basis = np.tile([1.0, 0.0, 0.0, 0.0], (5, len(skeleton), 1))
+    basis[:, [skeleton.index[name] for name in turned]] = rotations
+    whole, heads = skeleton.pose(basis)
+    for name, (turns, shifts) in found.items():
+        bone = skeleton.index[name]
+        np.testing.assert_allclose(
+            rotate(turns, skeleton.heads[bone]) + shifts, heads[:, bone], atol=1e-12
+        )
+        expected = multiply(whole[:, bone], conjugate(skeleton.rest_rotations[bone]))
+        np.testing.assert_allclose(np.abs(np.sum(turns * expected, axis=1)), 1.0, atol=1e-12)

@@ -69,9 +69,25 @@ def test_an_offset_given_for_one_arm_replaces_the_spread() -> None:
     assert table.offset("RIGHT", 2, 4) == PRESETS["walk"].offset("RIGHT", 2, 4)
 
 
+def counted_from_the_front() -> gait.GaitTable:
+    """Tiptoe as files of others may have it, for four pairs."""
+    table = PRESETS["tiptoe"]
+    curves = {pair if pair >= 0 else 5 + pair: curve for pair, curve in table.curves.items()}
+    return dataclasses.replace(table, curves=curves)
+
+
+@pytest.mark.parametrize("pairs", [1, 2, 3, 4, 5, 6])
+def test_the_rear_pair_tiptoes_however_many_there_are(pairs: int) -> None:
+    table = PRESETS["tiptoe"]
+    own = table.for_pairs(pairs)
+    stepping = [pair for pair in range(1, pairs + 1) if not own.curve(pair).free]
+    assert stepping == [pairs]
+    assert own.curve(pairs) is table.curve(-1)
+
+
 @pytest.mark.parametrize("pairs", [1, 2, 3, 4, 5])
 def test_rear_arms_do_what_a_gait_has_for_them_where_there_are_fewer(pairs: int) -> None:
-    table = PRESETS["tiptoe"]
+    table = counted_from_the_front()
     own = table.for_pairs(pairs)
     # Five pairs are more than it knows of: its fourth is the fourth.
     rear = min(pairs, 4)
@@ -81,7 +97,8 @@ def test_rear_arms_do_what_a_gait_has_for_them_where_there_are_fewer(pairs: int)
 
 
 def test_offsets_of_single_arms_move_to_the_rear_with_their_pairs() -> None:
-    table = dataclasses.replace(PRESETS["tiptoe"], offsets={(4, "LEFT"): 1.0, (1, "RIGHT"): 2.0})
+    offsets = {(4, "LEFT"): 1.0, (1, "RIGHT"): 2.0}
+    table = dataclasses.replace(counted_from_the_front(), offsets=offsets)
     assert table.for_pairs(3).offsets == {(3, "LEFT"): 1.0}
     assert table.for_pairs(4) is table
 

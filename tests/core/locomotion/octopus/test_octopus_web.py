@@ -65,8 +65,8 @@ def test_any_number_of_arms_from_three_on_has_it_between_each_arm_and_the_next(
     shape: OctopusShape, mesh: OctopusMesh
 ) -> None:
     points = mesh.vertices[mesh.web]
-    turn = np.arctan2(points[:, 0], -points[:, 1]) % (2.0 * np.pi)
-    between = np.floor(turn / (2.0 * shape.half_sector) - 0.5).astype(int) % shape.arms
+    turn = (np.arctan2(points[:, 0], -points[:, 1]) - shape.angles[0]) % (2.0 * np.pi)
+    between = np.floor(turn / (2.0 * shape.half_sector)).astype(int)
     counts = np.bincount(between, minlength=shape.arms)
     assert counts.min() == counts.max() > 0
     assert reach(shape, mesh) == pytest.approx(1.0 / 3.0, abs=0.1)
@@ -139,7 +139,8 @@ def test_each_point_follows_the_two_arms_beside_it_in_shares_that_add_up(
     np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=1e-9)
     arm = (bones - 7) // shape.joints
     turn = np.arctan2(mesh.vertices[mesh.web][:, 0], -mesh.vertices[mesh.web][:, 1])
-    first = np.floor(turn % (2.0 * np.pi) / (2.0 * shape.half_sector) - 0.5).astype(int)
+    turn = (turn - shape.angles[0]) % (2.0 * np.pi)
+    first = np.floor(turn / (2.0 * shape.half_sector)).astype(int)
     moved = (weights > 0.0) & (bones >= 7)
     ahead = (arm - first[:, None]) % shape.arms
     assert np.all(ahead[moved] <= 1)
