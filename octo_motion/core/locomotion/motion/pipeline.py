@@ -212,8 +212,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     # The ground is as it was planned on.
     planned, along = posed.planned or (arms, posed.going)
     framed, stays = ((each[0][on_frames], each[1][on_frames]) for each in (along, keyed))
-    played = planned.at(on_frames), framed, stays, _volume(plan, organs.at(on_frames))
-    measuring = _measuring(plan, *played, turning=posed.turning)
+    measuring = _measuring(plan, planned.at(on_frames), framed, stays, (organs, posed.turning))
     measured, overlaps = yield from scaled(measuring, moving, moving)
     if measured is not None and plan.carry is not None:
         measured = _rolled_up(plan, measured, posed)
@@ -794,12 +793,15 @@ def _measuring(
     arms: ArmMotion,
     going: Travelled,
     keyed: Travelled,
-    volume: BodyVolume | None,
-    *,
-    turning: Floats | None,
+    known: tuple[OrganPoses, Floats | None],
 ) -> Generator[None, None, tuple[Measured | None, tuple[str, ...]]]:
-    """In steps, what figures are taken from, where they are wanted, and what overlaps in words."""
+    """In steps, what figures are taken from, where they are wanted, and what overlaps in words.
+
+    What is known at all moments are the body's organs and, perhaps, by how much bones turn.
+    """
     job, creature, separation, every = plan.job, plan.job.creature, None, 1
+    organs, turning = known
+    volume = _volume(plan, organs.at(slice(None, None, plan.stride)))
     overlaps: tuple[str, ...] = ()
     if volume is not None and job.tell_overlaps:
         separation, every = yield from volume.measuring(arms.rotations, arms.strains)
