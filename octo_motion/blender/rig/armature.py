@@ -572,6 +572,8 @@ _MOST_OF_SIDE: Final = 0.95
 """The same of how far they lie to the sides."""
 _NEAR: Final = 0.2
 """Share of a part's vertices that tell how thick it is somewhere along it."""
+_ASIDE: Final = 0.1
+"""Of the thickest part: how much wider than deep another has to be for that to matter."""
 _TIMES: Final = 3
 """How often it is looked how thick it is where it ends, and where it ends as it is so thick."""
 _LAST: Final = 0.05
@@ -680,7 +682,7 @@ def skin_parts(
     A bone's own ends tell little of that: a head is round about a bone of any length, and files of
     other programs know no tails. So a part reaches as far as its skin does along its bone, or along
     the skin's own longest way if that makes it much smaller. Bones that no skin follows are none.
-    Returns name, ends (2, 3) and radii (2,) of each part, armature space.
+    Returns name, joints (n, 3) and radii (n,) of each part, armature space.
     """
     assert isinstance(armature.data, bpy.types.Armature)
     bones = armature.data.bones
@@ -695,11 +697,13 @@ def skin_parts(
             continue
         head, tail = (np.array(end) for end in (bones[name].head_local, bones[name].tail_local))
         middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        own = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0]
+        around = points - points.mean(axis=0)
+        own = np.linalg.eigh(around.T @ around)[1][:, 2]
         along = (tail - head) / max(float(np.linalg.norm(tail - head)), 1e-12)
         part, other = _part(points, head, along), _part(points, middle, own)
         parts.append((name, *(part if _volume(*part) <= _MUCH * _volume(*other) else other)))
-    return parts
+    thickest = max((float(radii.max()) for _, _, radii in parts), default=0.0)
+    return [(name, *_rounded(joints, radii, _ASIDE * thickest)) for name, joints, radii in parts]
 
 
 def _part(points: Floats, start: Floats, along: Floats) -> tuple[Floats, Floats]:
@@ -709,13 +713,13 @@ def _part(points: Floats, start: Floats, along: Floats) -> tuple[Floats, Floats]
     seen = points - start
     height = seen @ along
     across = seen - height[:, None] * along
-    wide = np.linalg.svd(across, full_matrices=False)[2][0]
+    wide = np.linalg.eigh(across.T @ across)[1][:, 2]
     sides = np.abs(np.stack([across @ wide, across @ np.cross(along, wide)]))
     away = np.linalg.norm(across, axis=1)
     radius = float(np.quantile(away, _MOST))
     low, high = np.quantile(height, [_REACHED, 1.0 - _REACHED])
-    some, few = (max(_FEW, round(share * len(points))) for share in (_NEAR, _LAST))
     order, left, right, radii = np.argsort(height), [], [], []
+    some, few = (max(_FEW, round(share * len(points))) for share in (_NEAR, _LAST))
     for end, inwards, last in ((low, 1.0, order[:few]), (high, -1.0, order[-few:])):
         # As far from its end as it is thick there, and half as far where that is open and the
         # body goes on in another part; but not beyond the middle.
@@ -724,13 +728,21 @@ def _part(points: Floats, start: Floats, along: Floats) -> tuple[Floats, Floats]
         half, at = np.full(2, radius), end
         for _ in range(_TIMES):
             at = end + inwards * min(inside * float(half.min()), 0.5 * (high - low))
-            near = np.argsort(np.abs(height - at))[:some]
+            near = np.argpartition(np.abs(height - at), min(some, len(height)) - 1)[:some]
             half = np.quantile(sides[:, near], _MOST_OF_SIDE, axis=1)
         shift = (half[0] - half.min()) * wide
         left.append(start + at * along - shift)
         right.append(start + at * along + shift)
         radii.append(float(half.min()))
     return np.array([*left, *reversed(right)]), np.array([*radii, *reversed(radii)])
+
+
+def _rounded(joints: Floats, radii: Floats, least: float) -> tuple[Floats, Floats]:
+    """One capsule in place of two beside each other, where these are no farther apart."""
+    aside = 0.5 * np.linalg.norm(joints[:2] - joints[:1:-1], axis=1)
+    if aside.max() > least:
+        return joints, radii
+    return 0.5 * (joints[:2] + joints[:1:-1]), radii[:2] + 0.5 * aside
 
 
 def _volume(joints: Floats, radii: Floats) -> float:
