@@ -569,7 +569,8 @@ _FEW: Final = 4
 _MOST: Final = 0.75
 """Share of a bone's vertices that lie within its radius: suckers stand out a little."""
 _MOST_OF_SIDE: Final = 0.95
-"""The same of how far they lie to the sides."""
+"""The same of how far they lie to the sides. At 0.9 tips of Curl are in the octopus' mantle at two
+moments of 49, at 0.95 at none."""
 _NEAR: Final = 0.2
 """Share of a part's vertices that tell how thick it is somewhere along it."""
 _ASIDE: Final = 0.1
