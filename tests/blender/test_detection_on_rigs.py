@@ -167,9 +167,11 @@ def test_our_own_octopus(arms: int, joints: int) -> None:
     found = detect(armature)
     assert len(found.arms) == arms
     assert {len(arm.bones) for arm in found.arms} == {joints}
-    half = arms // 2
-    expected = [180.0 / arms * (2 * pair + 1) * side for pair in range(half) for side in (1, -1)]
-    np.testing.assert_allclose(degrees(found.arms)[: 2 * half], expected, atol=1e-3)
+    # An odd one in front.
+    odd, sector = arms % 2, 360.0 / arms
+    places = [sector * (pair + 0.5 + 0.5 * odd) for pair in range(arms // 2)]
+    expected = [0.0] * odd + [place * side for place in places for side in (1, -1)]
+    np.testing.assert_allclose(degrees(found.arms), expected, atol=1e-3)
     for arm in found.arms:
         # Names and geometry agree: arm1.01.L … arm4.12.R, an odd one without a side.
         number, _, rest = arm.bones[0].removeprefix("arm").partition(".")
