@@ -208,12 +208,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     yield moving
     motion, further = _motion(plan, posed, moments, organs)
     yield moving
-    on_frames = slice(None, None, every)
-    # The ground is as it was planned on.
-    planned, along = posed.planned or (arms, posed.going)
-    framed, stays = ((each[0][on_frames], each[1][on_frames]) for each in (along, keyed))
-    measuring = _measuring(plan, planned.at(on_frames), framed, stays, (organs, posed.turning))
-    measured, overlaps = yield from scaled(measuring, moving, moving)
+    measured, overlaps = yield from scaled(_measuring(plan, posed, organs), moving, moving)
     if measured is not None and plan.carry is not None:
         measured = _rolled_up(plan, measured, posed)
     # A key at every moment, unless fewer say the same.
@@ -229,7 +224,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     yield 1.0
     # What is in a pose alone is on each frame, however few keys the motion has.
     further = [replace(each, values=each.values[::every]) for each in further]
-    warnings = *plan.warnings, *posed.warnings, *warnings_for_misses(plan, arms.at(on_frames))
+    misses = warnings_for_misses(plan, arms.at(slice(None, None, every)))
     result = MotionResult(
         plan=plan,
         channels=plan.job.creature.channels.written([*channels, *further]),
@@ -239,7 +234,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
         carried=reached.carried if reached is not None else (),
         measured=measured,
         figures=found,
-        warnings=(*warnings, *overlaps),
+        warnings=(*plan.warnings, *posed.warnings, *misses, *overlaps),
         notes=reached.notes if reached is not None else (),
     )
     yield 1.0
@@ -342,8 +337,7 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     arms = yield from scaled(_clearing(plan, made, going, cyclic=cyclic), 0.9, 0.9)
     yield 0.93
     swimming = segments.swimming(travel.distance)
-    frames = np.interp(times, plan.schedule.times, plan.schedule.frames)
-    volume = _volume(plan, organs_at(plan, frames, keyed, swimming))
+    volume = _volume_at(plan, times, keyed, swimming)
     yield 0.94
     # What is reached for is in the world.
     reached = _reach(plan, arms, volume, keyed, going) if plan.carry is None else None
@@ -599,10 +593,20 @@ def _clearing(
     return arms
 
 
-def _volume(plan: MotionPlan, organs: OrganPoses) -> BodyVolume | None:
-    """How much room arms and body take as the body moves by itself; none where nobody asks."""
-    volume, moving = plan.job.volume, plan.self_motion
-    if volume is None or moving is None:
+def _volume_at(
+    plan: MotionPlan, times: Floats, keyed: Travelled, swimming: Floats | None
+) -> BodyVolume | None:
+    """How much room arms and body take at times (moments,); none where nobody asks."""
+    if plan.job.volume is None:
+        return None
+    frames = np.interp(times, plan.schedule.times, plan.schedule.frames)
+    return _volume(plan, plan.job.volume, organs_at(plan, frames, keyed, swimming))
+
+
+def _volume(plan: MotionPlan, volume: BodyVolume, organs: OrganPoses) -> BodyVolume:
+    """The same as the body moves by itself."""
+    moving = plan.self_motion
+    if moving is None:
         return volume
     names = [each.name for each in volume.body]
     # As wide as it ever gets: what arms do at a moment does not hang on which others are asked.
@@ -789,21 +793,18 @@ def _opened(plan: MotionPlan, count: int, swimming: Floats | None) -> Opened | N
 
 
 def _measuring(
-    plan: MotionPlan,
-    arms: ArmMotion,
-    going: Travelled,
-    keyed: Travelled,
-    known: tuple[OrganPoses, Floats | None],
+    plan: MotionPlan, posed: _Posed, organs: OrganPoses
 ) -> Generator[None, None, tuple[Measured | None, tuple[str, ...]]]:
-    """In steps, what figures are taken from, where they are wanted, and what overlaps in words.
-
-    What is known at all moments are the body's organs and, perhaps, by how much bones turn.
-    """
+    """In steps, what figures are taken from, where they are wanted, and what overlaps in words."""
     job, creature, separation, every = plan.job, plan.job.creature, None, 1
-    organs, turning = known
-    volume = _volume(plan, organs.at(slice(None, None, plan.stride)))
+    on_frames, turning = slice(None, None, plan.stride), posed.turning
+    # The ground is as it was planned on.
+    planned, along = posed.planned or (posed.arms, posed.going)
+    going, keyed = ((each[0][on_frames], each[1][on_frames]) for each in (along, posed.keyed))
+    arms = planned.at(on_frames)
     overlaps: tuple[str, ...] = ()
-    if volume is not None and job.tell_overlaps:
+    if job.volume is not None and job.tell_overlaps:
+        volume = _volume(plan, job.volume, organs.at(on_frames))
         separation, every = yield from volume.measuring(arms.rotations, arms.strains)
         yield
         overlaps = volume.told(separation, every, plan.schedule.frames)
