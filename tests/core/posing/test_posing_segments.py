@@ -63,7 +63,7 @@ def test_segments_have_the_solution_of_one_system(name: str, size: int) -> None:
         tree.use_rows(onto)
         joints = np.zeros((len(tree.layout.bodies), 3, 3))
         joints[tree.joint_slot] = blocks
-        right = tree.fill(stack, joints)
+        right = tree.fill(tree.summed(stack[:-4]), stack[-4:], joints)
         solved = tree.solve_all(right)
         slots = len(tree.layout.bodies)
         speeds = solved[: 3 * slots, 0].reshape(slots, 3)

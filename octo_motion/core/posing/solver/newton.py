@@ -125,14 +125,14 @@ class Newton:
         if problem.driven is not None:
             self._base = self._base + problem.law.drawn(problem.driven)
         self._held = problem.step * self._base
-        stack = self._stack(problem, 1 if corrections is None else 2)
+        bodies = self._bodies(problem, 1 if corrections is None else 2)
         point, tangents = self._begin(problem, start)
         shift: Floats | None = None
         miss = np.inf
         count = rounds = 0
         while True:
             count += 1
-            solved = self._linear(problem, stack, tangents, corrections)
+            solved = self._linear(problem, bodies, tangents, corrections)
             if corrections is not None:
                 shift = solved[..., 1] - solved[..., 0]
             end = self._at(problem, np.ascontiguousarray(solved[:, :, 0]))
@@ -221,13 +221,11 @@ class Newton:
         slopes, right = point.response.planes(self._base, point.joint_speeds)
         return _planes(problem, slopes, right, point.pressed, rows, linear=False)
 
-    def _stack(self, problem: Problem, columns: int) -> Floats:
-        """(bodies and rows, 6, 6 + columns) inertias and momenta; those of rows are left open."""
+    def _bodies(self, problem: Problem, columns: int) -> Floats:
+        """What all bodies, with inertias and momenta, are to the tree."""
         rows, bodies = problem.rows, len(problem.masses)
-        stack = np.empty((bodies + len(rows.bodies), 6, 6 + columns))
-        flat = stack.reshape(len(stack), -1)
-        np.matmul(problem.moments, self._maps[columns - 1], out=flat[:bodies])
-        stack[:bodies, :, 6:] = problem.momenta[:, :, None]
+        own = (problem.moments @ self._maps[columns - 1]).reshape(bodies, 6, -1)
+        own[:, :, 6:] = problem.momenta[:, :, None]
         if rows.pattern is not self._pattern:
             onto = np.zeros((bodies, len(rows.bodies)))
             onto[rows.bodies, np.arange(len(rows.bodies))] = 1.0
@@ -236,20 +234,17 @@ class Newton:
             onto[rows.others[rows.paired], rows.paired] -= 1.0
             self._tree.use_rows(onto)
             self._pattern = rows.pattern
-        return stack
+        return self._tree.summed(own)
 
     def _linear(
-        self, problem: Problem, stack: Floats, tangents: _Tangents, corrections: Floats | None
+        self, problem: Problem, bodies: Floats, tangents: _Tangents, corrections: Floats | None
     ) -> Floats:
         """(slots, 3, columns) solution with all laws replaced by their tangents."""
         tree, rows, planes = self._tree, problem.rows, tangents.rows
-        bodies = len(problem.masses)
+        own = _NO_INERTIAS
         if planes is not None:
-            np.matmul(
-                rows.reach.transpose(0, 2, 1),
-                _lowered(rows, planes, corrections, stack.shape[2] - 6),
-                out=stack[bodies:],
-            )
+            lowered = _lowered(rows, planes, corrections, bodies.shape[-1] - 6)
+            own = rows.reach.transpose(0, 2, 1) @ lowered
         if tangents.slopes is not self._slopes:
             self._slopes = tangents.slopes
             self._joint_blocks[tree.joint_slot] = tangents.slopes
@@ -259,7 +254,7 @@ class Newton:
             firm = _FIRM * float(problem.masses.sum())
             self._joint_blocks[tree.carried_slots] = firm * _UNIT
             self._joint_right[tree.carried_slots] = firm * problem.carried
-        right = tree.fill(stack, self._joint_blocks)
+        right = tree.fill(bodies, own, self._joint_blocks)
         right[: 3 * len(self._joint_right)] += self._joint_right.reshape(-1, 1)
         if planes is not None and len(rows.paired):
             solved = self._with_pairs(problem, planes, right)
@@ -454,3 +449,4 @@ _ROUNDS = 2
 _NEARLY = 0.1
 """Miss at which they can: to settle before would be to settle what is asked anew."""
 _NO_ROWS = np.zeros((0, 3))
+_NO_INERTIAS = np.zeros((0, 6, 7))

@@ -230,9 +230,8 @@ class SegmentedTree(Tree):
         return self.segments.cost
 
     def use_rows(self, onto: Floats) -> None:
-        self._onto = onto
-        local = self._sums @ onto[self._members]
-        self.moved = self._by_unknown(local)
+        self._onto = self._sums @ onto[self._members]
+        self.moved = self._by_unknown(self._onto)
 
     def _by_unknown(self, local: Floats) -> Floats:
         """(slots and segments, columns) of (segments, slots and one, columns)."""
@@ -240,15 +239,15 @@ class SegmentedTree(Tree):
         slots = local[:, :width].reshape(len(local) * width, local.shape[-1])
         return np.concatenate([slots, local[:, width]])
 
-    def fill(self, stack: Floats, joints: Floats) -> Floats:
-        bodies, columns = len(self.parents), stack.shape[2]
-        flat = stack.reshape(len(stack), -1)
-        total = flat[:bodies]
-        if self._onto.shape[1]:
-            total = total + self._onto @ flat[bodies:]
-        local = self._sums @ total.take(self._members, 0)
-        count, width = len(local), self._width
-        local = local.reshape(count, width + 1, 6, columns)
+    def summed(self, bodies: Floats) -> Floats:
+        sums = self._sums @ bodies.reshape(len(bodies), -1).take(self._members, 0)
+        return sums.reshape(len(sums), self._width + 1, 6, -1)
+
+    def fill(self, summed: Floats, rows: Floats, joints: Floats) -> Floats:
+        local = summed
+        if len(rows):
+            local = local + (self._onto @ rows.reshape(len(rows), -1)).reshape(local.shape)
+        count, width, columns = len(local), self._width, local.shape[3]
         motion = self.motion.reshape(count, width, 3, 6)
         both = (motion @ local[:, :width]).reshape(count, 3 * width, columns)
         motion = motion.reshape(count, 3 * width, 6)

@@ -145,18 +145,25 @@ class Tree:
         """From now on rows act on bodies as (bodies, rows) says, 1, −1 or 0."""
         self.moved: Floats = self.beyond @ onto
         """(slots, rows) by which a slot moves a row."""
-        self._wide = np.concatenate([self.beyond, self.moved], axis=1)
 
-    def fill(self, stack: Floats, joints: Floats) -> Floats:
+    def summed(self, bodies: Floats) -> Floats:
+        """What ``fill`` asks of the bodies: (bodies, 6, 6 + columns) inertias and beside them
+        momenta, summed over all that moves with each slot. All systems of a step share them.
+        """
+        sums = self.beyond @ bodies.reshape(len(bodies), -1)
+        return sums.reshape(len(sums), 6, -1)
+
+    def fill(self, summed: Floats, rows: Floats, joints: Floats) -> Floats:
         """Fill the matrix of (1), and get its right side (unknowns, columns) but for the joints'.
 
-        ``stack`` (bodies and rows, 6, 6 + columns) has inertias and beside them momenta; ``joints``
-        (slots, 3, 3) is K, which stands on each slot's own block.
+        ``rows`` (rows, 6, 6 + columns) have what ``summed`` has; ``joints`` (slots, 3, 3) is K,
+        which stands on each slot's own block.
         """
-        summed = self._wide @ stack.reshape(len(stack), -1)
-        both = self.motion @ summed.reshape(len(summed), 6, -1)
+        if len(rows):
+            summed = summed + (self.moved @ rows.reshape(len(rows), -1)).reshape(summed.shape)
+        both = self.motion @ summed
         self.assemble(both[:, :, :6], joints)
-        return both[:, :, 6:].reshape(-1, stack.shape[2] - 6)
+        return both[:, :, 6:].reshape(-1, summed.shape[2] - 6)
 
     def spread(self, wide: Floats, signs: Floats) -> Floats:
         """(unknowns, columns) of impulses (6, columns), each with the sign by which a slot
