@@ -26,7 +26,14 @@ from .actions import (
     write_action,
 )
 from .artist_layer import CYCLES, edit_layer, follow, is_layer, lay_edits
-from .clip_sources import actions_for, own_action, played_action, still_clip, strips_of
+from .clip_sources import (
+    actions_for,
+    own_action,
+    played_action,
+    still_clip,
+    strips_alone,
+    strips_of,
+)
 from .clips import (
     clip_channels,
     closes,
@@ -153,6 +160,7 @@ __all__ = [
     "slot_of",
     "standing_of",
     "still_clip",
+    "strips_alone",
     "strips_of",
     "time_kept",
     "unedited_with_note",

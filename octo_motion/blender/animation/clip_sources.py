@@ -8,6 +8,8 @@ from typing import Final
 import bpy
 import numpy as np
 
+from ...core.errors import ClipError
+from ...core.phrases import phrase
 from ...core.rotations import IDENTITY, Floats
 from ...core.splicing.clip import Clip
 from ..rig import armature_data, bone_and_property, read_skeleton, world_matrix
@@ -62,6 +64,17 @@ def strips_of(armature: bpy.types.Object) -> list[bpy.types.NlaStrip]:
         for strip in track.strips
         if not (track.mute or strip.mute) and strip.action is not None
     ]
+
+
+def strips_alone(armature: bpy.types.Object) -> ClipError:
+    """Why no action can be taken of an armature whose motion lies in strips."""
+    return ClipError(
+        phrase(
+            "The motion of '{armature}' lies in strips of the NLA.",
+            armature=armature.name,
+        ),
+        "Choose the action of one, or make one of all (Object > Animation > Bake Action).",
+    )
 
 
 def own_action(armature: bpy.types.Object) -> tuple[bpy.types.Action, str] | None:

@@ -15,9 +15,12 @@ from ...blender.animation import (
     SplicedMotion,
     curves_of,
     layers_off,
+    played_action,
     read_channels,
     read_clip,
     setting_values,
+    strips_alone,
+    strips_of,
     writable_armature,
     write_into,
     write_layer,
@@ -233,10 +236,10 @@ def followed_action(
     armature: bpy.types.Object,
 ) -> tuple[bpy.types.Action, bpy.types.ActionSlot | None]:
     """The action that is followed: the armature's own, or where that has become a layer's base or
-    is a result itself, the one that was followed before.
+    is a result itself, the one that was followed before. Without either, that of its one NLA strip.
 
     Raises:
-        ClipError: there is none.
+        ClipError: there is none, or the motion lies in several strips.
     """
     settings, data = follow_settings(armature), armature.animation_data
     own = None if data is None else data.action
@@ -248,6 +251,12 @@ def followed_action(
             return own, slot
     if settings.base is not None:
         return settings.base, None
+    played = played_action(armature)
+    if own is None and played is not None:
+        action, slot = played
+        return action, action.slots.get(slot)
+    if strips_of(armature):
+        raise strips_alone(armature)
     raise ClipError(
         phrase("'{armature}' has no action to follow.", armature=armature.name),
         "Give it one, or generate a motion first.",

@@ -9,7 +9,13 @@ from typing import Any, Final, cast
 import bpy
 from bpy.props import EnumProperty, IntProperty, StringProperty
 
-from ...blender.animation import played_action, scene_rate, strips_of, writable_armature
+from ...blender.animation import (
+    played_action,
+    scene_rate,
+    strips_alone,
+    strips_of,
+    writable_armature,
+)
 from ...blender.rig import active_armature
 from ...core.errors import ClipError
 from ...core.phrases import joined_phrases, phrase
@@ -293,15 +299,9 @@ def _base(armature: bpy.types.Object, settings: Any) -> tuple[bpy.types.Action, 
 
 def no_action(armature: bpy.types.Object, otherwise: str) -> ClipError:
     """Why no action of an armature's can be taken: its motion lies in the NLA, or as it is said."""
-    if not strips_of(armature):
-        return ClipError(otherwise, "Give it one, or choose an action.")
-    return ClipError(
-        phrase(
-            "The motion of '{armature}' lies in strips of the NLA.",
-            armature=armature.name,
-        ),
-        "Choose the action of one, or make one of all (Object > Animation > Bake Action).",
-    )
+    if strips_of(armature):
+        return strips_alone(armature)
+    return ClipError(otherwise, "Give it one, or choose an action.")
 
 
 # --- Building, and timing that is suggested -------------------------------------------------------

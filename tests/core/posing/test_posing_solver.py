@@ -66,6 +66,7 @@ def busy_world(seed: int) -> World:
 
 # Figures on which Gauss–Seidel arrives within some hundred sweeps; on others it takes thousands,
 # and comes as near to the fast solver as its own changes still are from nothing.
+@pytest.mark.one_blender
 @pytest.mark.parametrize("seed", [0, 1, 5, 12, 13, 21, 30, 32])
 def test_fast_solver_gives_the_answer_of_gauss_seidel(seed: int):
     world = busy_world(seed)

@@ -134,6 +134,41 @@ def test_made_again_it_is_made_in_place_and_the_same() -> None:
     assert len(fox.animation_data.nla_tracks) == 2
 
 
+def test_an_action_that_lies_in_the_one_strip_of_the_nla_is_followed() -> None:
+    fox = make_fox()
+    select_tail(fox)
+    assert bpy.ops.octo_motion.follow_through() == {"FINISHED"}
+    expected = played(fox)
+    fox = make_fox()
+    select_tail(fox)
+    own = fox.animation_data.action
+    strips = fox.animation_data.nla_tracks.new().strips
+    strips.new("Wag", 1, own)
+    fox.animation_data.action = None
+    before = keys(own)
+    assert bpy.ops.octo_motion.follow_through() == {"FINISHED"}
+    assert keys(own) == before
+    strips = [each for track in fox.animation_data.nla_tracks for each in track.strips]
+    assert [each.action for each in strips] == [own, follow_settings(fox).result]
+    np.testing.assert_allclose(played(fox), expected, atol=1e-6)
+    assert bpy.ops.octo_motion.follow_through() == {"FINISHED"}
+    np.testing.assert_allclose(played(fox), expected, atol=1e-6)
+
+
+def test_a_motion_in_several_strips_is_told_and_left_alone() -> None:
+    fox = make_fox()
+    select_tail(fox)
+    own = fox.animation_data.action
+    strips = fox.animation_data.nla_tracks.new().strips
+    strips.new("Wag", 1, own)
+    strips.new("Wag again", 1 + FRAMES, own)
+    fox.animation_data.action = None
+    with pytest.raises(RuntimeError, match="lies in strips of the NLA"):
+        bpy.ops.octo_motion.follow_through()
+    assert follow_settings(fox).result is None
+    assert len(bpy.data.actions) == 1
+
+
 def test_new_action_has_the_rest_of_the_old_one_and_the_same_action_takes_it_in() -> None:
     fox = make_fox()
     select_tail(fox)
