@@ -235,8 +235,8 @@ def _local(name: str) -> bpy.types.Object:
 def followed_action(
     armature: bpy.types.Object,
 ) -> tuple[bpy.types.Action, bpy.types.ActionSlot | None]:
-    """The action that is followed: the armature's own, or where that has become a layer's base or
-    is a result itself, the one that was followed before. Without either, that of its one NLA strip.
+    """The action that is followed: the armature's own, or that of its one NLA strip. Where that has
+    become a layer's base or is a result itself, the one that was followed before.
 
     Raises:
         ClipError: there is none, or the motion lies in several strips.
@@ -249,12 +249,12 @@ def followed_action(
         curves = () if slot is None else curves_of(own, slot)
         if any(not each.data_path.startswith("octo_motion.") for each in curves):
             return own, slot
-    if settings.base is not None:
-        return settings.base, None
     played = played_action(armature)
-    if own is None and played is not None:
+    if own is None and played is not None and played[0] != settings.result:
         action, slot = played
         return action, action.slots.get(slot)
+    if settings.base is not None:
+        return settings.base, None
     if strips_of(armature):
         raise strips_alone(armature)
     raise ClipError(

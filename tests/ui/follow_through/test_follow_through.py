@@ -155,6 +155,20 @@ def test_an_action_that_lies_in_the_one_strip_of_the_nla_is_followed() -> None:
     np.testing.assert_allclose(played(fox), expected, atol=1e-6)
 
 
+def test_a_strip_that_is_there_now_is_followed_and_not_the_action_of_before() -> None:
+    fox = make_fox()
+    select_tail(fox)
+    assert bpy.ops.octo_motion.follow_through() == {"FINISHED"}
+    tracks = fox.animation_data.nla_tracks
+    for track in list(tracks):
+        tracks.remove(track)
+    other = bpy.data.actions["Wag"].copy()
+    tracks.new().strips.new("Other", 1, other)
+    fox.animation_data.action = None
+    assert bpy.ops.octo_motion.follow_through() == {"FINISHED"}
+    assert follow_settings(fox).base == other
+
+
 def test_a_motion_in_several_strips_is_told_and_left_alone() -> None:
     fox = make_fox()
     select_tail(fox)

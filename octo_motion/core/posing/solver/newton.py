@@ -222,7 +222,7 @@ class Newton:
         return _planes(problem, slopes, right, point.pressed, rows, linear=False)
 
     def _bodies(self, problem: Problem, columns: int) -> Floats:
-        """What all bodies, with inertias and momenta, are to the tree."""
+        """What a step's systems share: inertias and momenta of all bodies as ``Tree.summed``."""
         rows, bodies = problem.rows, len(problem.masses)
         own = (problem.moments @ self._maps[columns - 1]).reshape(bodies, 6, -1)
         own[:, :, 6:] = problem.momenta[:, :, None]
