@@ -18,12 +18,10 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
-from unittest.mock import patch
 
 import bpy
 import numpy as np
@@ -38,11 +36,11 @@ from octo_motion.core.splicing.clip.splice_timing import Timing
 from octo_motion.core.splicing.humanoid.correspondence import rest_alike, same_build
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
-from octo_motion.core.splicing.transfer import retarget
 from octo_motion.core.splicing.transfer.parts import PARTS
 from octo_motion.core.splicing.transfer.splice import Splice, build_splices
 from tests.bench.splice_joints import joints_at
 from tests.bench.splicing import quiet_blender
+from tests.core.splice_bodies import reference_poses_found_once
 from tests.referee import clip_measures as measures
 from tests.referee.clip_measures import SIDES, Joints, Twist
 from tests.referee.recording import Flags, Floats
@@ -540,21 +538,6 @@ def _thinned(path: Path, folder: Path) -> Path:
     step = max(1, -(-len(clip.motion) // MOMENTS))
     # A moment a frame: what is measured does not hang on how fast people move.
     return Bvh(clip.joints, 1.0 / _RATE, clip.motion[::step]).write(folder / path.name)
-
-
-@contextmanager
-def reference_poses_found_once() -> Iterator[None]:
-    """Each clip's reference pose is found once for all its pairs; it hangs on the clip alone."""
-    find, known = retarget.find_reference_pose, dict[Any, Any]()
-
-    def once(clip: Clip, landmarks: Landmarks, **asked: bool) -> Any:
-        key = (id(clip), *sorted(asked.items()))
-        if key not in known:
-            known[key] = clip, find(clip, landmarks, **asked)
-        return known[key][1]
-
-    with patch.object(retarget, "find_reference_pose", once):
-        yield
 
 
 # --- Telling -------------------------------------------------------------------------------------

@@ -34,11 +34,10 @@ from tests.bench.splice_pairs import (
     Pair,
     Take,
     measured_where_possible,
-    reference_poses_found_once,
     takes,
     text,
 )
-from tests.core.splice_bodies import in_another_file
+from tests.core.splice_bodies import in_another_file, reference_poses_found_once
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::ResourceWarning"),

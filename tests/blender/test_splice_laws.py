@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What must hold of splicing, on recorded motion."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ from octo_motion.core.splicing.transfer.reference_pose import ReferencePose
 from octo_motion.core.splicing.transfer.retarget import MappedClip, ReferredClip
 from octo_motion.core.splicing.transfer.splice import LimbGoal, Splice, build_splices
 from tests.bench.splice_quality import feet_at_rest, limb_length
-from tests.core.splice_bodies import spliced
+from tests.core.splice_bodies import reference_poses_found_once, spliced
 
 LEFT_ARM, LEGS, RIGHT_ARM = (PARTS[name] for name in ("left_arm", "legs", "right_arm"))
 
@@ -72,7 +73,20 @@ CLIPS = (*(f"secondlife/avatar_{name}.bvh" for name in SECOND_LIFE), *OTHERS)
 GOALS: tuple[LimbGoal, ...] = ("direction", "exact")
 
 
-def load(path: Path, frames: Any = None) -> tuple[Clip, Landmarks]:
+@pytest.fixture(scope="module", autouse=True)
+def _reference_poses() -> Iterator[None]:
+    with reference_poses_found_once():
+        yield
+
+
+@cache
+def load(path: Path) -> tuple[Clip, Landmarks]:
+    """A clip and its landmarks; nothing changes clips, so that each file is read once."""
+    return imported(path)
+
+
+def imported(path: Path, frames: Any = None) -> tuple[Clip, Landmarks]:
+    """The same in Blender, alone."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     if path.suffix == ".bvh":
         bpy.ops.import_anim.bvh(filepath=str(path), update_scene_fps=True)
@@ -183,7 +197,7 @@ def test_bvh_fbx_and_gltf_of_a_motion_give_the_same(
     path = shared_data(f"derived_fbx_gltf/sl_{name}.{suffix}")
     # glTF has no frame rate: its keys lie between frames. FBX shifts all by one frame.
     frames = clip.frames * 24.0 / clip.rate if suffix == "glb" else None
-    other, others = load(path, frames)
+    other, others = imported(path, frames)
     if suffix == "glb":
         other = replace(other, frames=clip.frames, rate=clip.rate)
     size = height(base, landmarks)
@@ -553,7 +567,7 @@ def foot_in_pelvis(body: ReferredBody, side: str) -> Floats:
 def test_the_sources_own_experiment_becomes_new_actions(shared_data: SharedData):
     throw, marks = load(shared_data("secondlife/avatar_throw_R.bvh"))
     punch, _ = load(shared_data("secondlife/avatar_punch_L.bvh"))
-    walk, landmarks = load(shared_data("secondlife/avatar_walk.bvh"))
+    walk, landmarks = imported(shared_data("secondlife/avatar_walk.bvh"))
     armature: Any = next(item for item in bpy.data.objects if item.type == "ARMATURE")
     source = armature.animation_data.action
     base = repeated(walk, 36)

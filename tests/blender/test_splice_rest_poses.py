@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """No rest pose changes what a splice gives: clips of others, rewritten with other rest poses."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from octo_motion.core.splicing.transfer.parts import LEG, PARTS
 from octo_motion.core.splicing.transfer.splice import Splice
 from tests.blender.test_splice_laws import height, load, positions
-from tests.core.splice_bodies import spliced
+from tests.core.splice_bodies import reference_poses_found_once, spliced
 from tests.referee.recording import Floats
 from tests.referee.rest_poses import (
     Bvh,
@@ -48,36 +49,47 @@ RESTS = {
 }
 
 
-def mapped(path: Path, kept: Landmarks | None = None) -> tuple[Clip, Landmarks]:
-    clip, _ = load(path)
-    return clip, kept or map_skeleton(clip.skeleton, average_pose(clip)).landmarks
+Mapped = Callable[..., tuple[Clip, Landmarks]]
+
+
+@pytest.fixture(scope="module")
+def mapped(
+    add_on: None,  # noqa: ARG001
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[Mapped]:
+    """A clip, as it is or rewritten with another rest pose, and its landmarks; read once each."""
+
+    @cache
+    def read(path: Path, rest: RestOf | None = None) -> tuple[Clip, Landmarks]:
+        if rest is not None:
+            other = tmp_path_factory.mktemp("rests") / path.name
+            path = with_rest(Bvh.read(path), rest).write(other)
+        clip, _ = load(path)
+        return clip, map_skeleton(clip.skeleton, average_pose(clip)).landmarks
+
+    with reference_poses_found_once():
+        yield read
 
 
 @pytest.mark.parametrize("rest", RESTS)
 @pytest.mark.parametrize("name", [*WALKS, "makehuman/walk1.bvh"])
 def test_landmarks_are_found_in_any_rest_pose(
-    shared_data: SharedData, tmp_path: Path, name: str, rest: str
+    shared_data: SharedData, mapped: Mapped, name: str, rest: str
 ) -> None:
-    path = shared_data(name)
-    other = with_rest(Bvh.read(path), RESTS[rest]).write(tmp_path / "other.bvh")
-    _, wanted = mapped(path)
-    _, found = mapped(other)
+    _, wanted = mapped(shared_data(name))
+    _, found = mapped(shared_data(name), RESTS[rest])
     assert {key: found.get(key) for key in wanted.bones} == dict(wanted.bones)
 
 
 @pytest.mark.parametrize("rest", RESTS)
 @pytest.mark.parametrize(("onto", "name"), PAIRS)
 def test_the_rest_pose_of_clip_and_base_changes_nothing(
-    shared_data: SharedData, tmp_path: Path, onto: str, name: str, rest: str
+    shared_data: SharedData, mapped: Mapped, onto: str, name: str, rest: str
 ) -> None:
-    folder = {each: shared_data(each) for each in (onto, name)}
-    base, landmarks = mapped(folder[onto])
-    clip, marks = mapped(folder[name])
-    other = {}
-    for each, kept in ((onto, landmarks), (name, marks)):
-        file = tmp_path / f"{Path(each).stem}.bvh"
-        with_rest(Bvh.read(folder[each]), RESTS[rest]).write(file)
-        other[each] = mapped(file, kept)
+    base, landmarks = mapped(shared_data(onto))
+    clip, marks = mapped(shared_data(name))
+    onto_other, _ = mapped(shared_data(onto), RESTS[rest])
+    other, _ = mapped(shared_data(name), RESTS[rest])
     size, timing = height(base, landmarks), Timing(base.frames[0], clip.frames[0])
     limbs = [base.skeleton.index[bone] for key, bone in landmarks.bones.items() if _wrung(key)]
     for part in PARTS.values():
@@ -86,8 +98,8 @@ def test_the_rest_pose_of_clip_and_base_changes_nothing(
             spliced(target, names, Splice(part, each, timing, known, travel=travel))
             for target, names, each, known in (
                 (base, landmarks, clip, marks),
-                (base, landmarks, *other[name]),
-                (*other[onto], clip, marks),
+                (base, landmarks, other, marks),
+                (onto_other, landmarks, clip, marks),
             )
         )
         assert np.abs(positions(rewritten) - positions(plain)).max() < 1e-3 * size
@@ -99,20 +111,19 @@ def test_the_rest_pose_of_clip_and_base_changes_nothing(
 @pytest.mark.parametrize("rest", [arms_lowered(40.0), arms_lowered(75.0, elbows=30.0)])
 @pytest.mark.parametrize("name", ["throw_R", "dance1", "hello", "sword_strike_R", "aim_L_bow"])
 def test_one_body_in_other_poses_to_stand_in_is_not_wrung(
-    shared_data: SharedData, tmp_path: Path, name: str, rest: RestOf
+    shared_data: SharedData, mapped: Mapped, name: str, rest: RestOf
 ) -> None:
     # Elbows bend anyhow here: from the motions alone arms are off by 24° in the median, and by 99°
     # at most. By the rest poses 2.6° at most, and less
     # than 1° with straight elbows.
     base, landmarks = mapped(shared_data("secondlife/avatar_walk.bvh"))
-    file = shared_data(f"secondlife/avatar_{name}.bvh")
-    clip, marks = mapped(file)
-    other = with_rest(Bvh.read(file), rest).write(tmp_path / "other.bvh")
+    clip, marks = mapped(shared_data(f"secondlife/avatar_{name}.bvh"))
+    other, _ = mapped(shared_data(f"secondlife/avatar_{name}.bvh"), rest)
     timing = Timing(base.frames[0], clip.frames[0])
     for part in PARTS.values():
         plain, rewritten = (
             spliced(base, landmarks, Splice(part, each, timing, known))
-            for each, known in ((clip, marks), mapped(other, marks))
+            for each, known in ((clip, marks), (other, marks))
         )
         off = np.abs(positions(rewritten) - positions(plain)).max()
         assert off < 1e-3 * height(base, landmarks)

@@ -1,7 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Made-up humanoids and motions for tests of splicing."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any
+from unittest.mock import patch
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -17,6 +22,7 @@ from octo_motion.core.rotations import (
 from octo_motion.core.skeleton import Skeleton
 from octo_motion.core.splicing.clip.clip import Clip, unposed
 from octo_motion.core.splicing.humanoid.landmarks import Landmarks
+from octo_motion.core.splicing.transfer import retarget
 from octo_motion.core.splicing.transfer.splice import Splice, build_splices
 from tests.core.rigs import skeleton_of
 
@@ -44,6 +50,24 @@ _SIDE = (
 def spliced(base: Clip, landmarks: Landmarks | None, splice: Splice) -> Clip:
     """One splice onto a clip."""
     return build_splices(base, landmarks, [splice])
+
+
+@contextmanager
+def reference_poses_found_once() -> Iterator[None]:
+    """Each clip's reference pose is found once, however many splices are made of it: it hangs on
+    the clip and its landmarks alone.
+    """
+    find, known = retarget.find_reference_pose, WeakKeyDictionary[Clip, dict[Any, Any]]()
+
+    def once(clip: Clip, landmarks: Landmarks, **asked: bool) -> Any:
+        of_clip = known.setdefault(clip, {})
+        key = (landmarks.reference, *sorted(landmarks.bones.items()), *sorted(asked.items()))
+        if key not in of_clip:
+            of_clip[key] = find(clip, landmarks, **asked)
+        return of_clip[key]
+
+    with patch.object(retarget, "find_reference_pose", once):
+        yield
 
 
 def humanoid(random: np.random.Generator, *, same_proportions: bool = True) -> Skeleton:

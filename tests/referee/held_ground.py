@@ -23,6 +23,8 @@ _SOME = 6
 """Of the skin, one vertex of so many is looked at …"""
 _DEPTHS = 12
 """… and all of them at one moment of so many."""
+_FAR = 0.5
+"""Arm lengths: skin farther from each face neither rests on it nor is alone in what is below."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +73,14 @@ class HeldGround:
             return self.still
         return BVHTree.FromPolygons(self.points[moment].tolist(), self.triangles.tolist())
 
+    def above(self, moment: int, faces: Integers, places: Floats) -> Floats:
+        """How far places (n, 3) are from the planes of faces (n,), on the side these show."""
+        corners = self.points[moment if self.moves else 0][self.triangles[faces]]
+        first, second, third = np.moveaxis(corners, 1, 0)
+        normal = np.cross(second - first, third - first)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        return np.einsum("ni,ni->n", places - first, normal)
+
     def seen_from(self, face: int, moments: slice, places: Floats) -> Floats:
         """Places (moments, 3) as somebody on one of the faces sees them."""
         first, second, third = np.moveaxis(self.points[moments][:, self.triangles[face]], 1, 0)
@@ -99,7 +109,7 @@ def held(
 ) -> Held:
     """How well arms hold on, and how deep their skin is in the ground."""
     rows = np.concatenate([recording.chain(arm) for arm in arms])
-    gaps, faces, depths = _looked_at(recording, rows, ground)
+    gaps, faces, depths = _looked_at(recording, rows, ground, length)
     middles, lying = recording.middles[:, rows], gaps < NEAR * length
     slow = CREEPING * length / recording.fps
     drift, holds = Worst(0.0, float(recording.frames[0])), 0
@@ -123,7 +133,7 @@ def held(
 
 
 def _looked_at(
-    recording: Recording, rows: Integers, ground: HeldGround
+    recording: Recording, rows: Integers, ground: HeldGround, length: float
 ) -> tuple[Floats, Integers, Floats]:
     """How far each bone's nearest skin is from the ground and which face that is, (moments, rows)
     both, and how deep the skin of all bones is in it (moments, bones).
@@ -131,20 +141,28 @@ def _looked_at(
     moments = len(recording.frames)
     gaps, faces = np.full((moments, len(rows)), np.inf), np.zeros((moments, len(rows)), dtype=int)
     depths = np.zeros((moments, len(recording.names)))
-    column_of = {int(row): column for column, row in enumerate(rows)}
+    columns = np.full(len(recording.names), -1)
+    columns[rows] = np.arange(len(rows))
     for moment in range(moments):
         tree = ground.tree(moment)
         for skin in recording.skins:
             step = slice(None, None, _SOME if moment % _DEPTHS else 1)
-            for place, bone in zip(skin.points[moment][step], skin.bones[step], strict=True):
-                if int(bone) not in column_of:
-                    continue
-                near, normal, face, apart = tree.find_nearest(place.tolist())
-                column = column_of[int(bone)]
-                if apart < gaps[moment, column]:
-                    gaps[moment, column], faces[moment, column] = apart, face
-                above = ground.side * float((place - np.array(near)) @ np.array(normal))
-                depths[moment, bone] = max(depths[moment, bone], -above)
+            of_arms = columns[skin.bones[step]] >= 0
+            places, bones = skin.points[moment][step][of_arms], skin.bones[step][of_arms]
+            found = [tree.find_nearest(place, _FAR * length) for place in places.tolist()]
+            near = np.array([each[2] is not None for each in found], bool)
+            if not near.any():
+                continue
+            bones = bones[near]
+            face = np.array([each[2] for each in found if each[2] is not None])
+            apart = np.array([each[3] for each in found if each[3] is not None])
+            below = -ground.side * ground.above(moment, face, places[near])
+            np.maximum.at(depths[moment], bones, below)
+            # The nearest of each bone's skin comes last, and so is the one that stays.
+            last = np.argsort(-apart, kind="stable")
+            face, apart, own = face[last], apart[last], columns[bones[last]]
+            nearer = apart < gaps[moment, own]
+            gaps[moment, own[nearer]], faces[moment, own[nearer]] = apart[nearer], face[nearer]
     return gaps, faces, depths
 
 
