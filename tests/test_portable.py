@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.one_blender
+
 REPOSITORY = Path(__file__).resolve().parent.parent
 FILES = sorted(
     path

@@ -7,6 +7,10 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
+pytestmark = pytest.mark.one_blender
+
 PACKAGE = Path(__file__).resolve().parent.parent / "octo_motion"
 LINES_OF_A_FUNCTION = 60
 LINES_OF_A_CLASS = 300

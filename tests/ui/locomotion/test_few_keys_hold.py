@@ -10,6 +10,8 @@ import pytest
 from tests.ui.made import prepare
 from tests.ui.rig import click, give_route
 
+pytestmark = pytest.mark.one_blender
+
 WAY = ((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, -1.6, 0.0), (0.6, -2.0, 0.0))
 SLIP = 0.006
 """Arm lengths that a foot may slide: a little over half of what the report lets pass."""

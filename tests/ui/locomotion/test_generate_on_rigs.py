@@ -16,6 +16,8 @@ from octo_motion.ui.locomotion.writing import shot as workflow
 from tests.ui.made import prepare
 from tests.ui.rig import click, joints_in_world
 
+pytestmark = pytest.mark.one_blender
+
 RIGS = (
     # file, armature, arms
     ("InfiniteSkinnedTentacle.glb", "Armature", 64),

@@ -26,6 +26,8 @@ from tests.ui.rig import (
 )
 from tests.ui.test_panels import Layout
 
+pytestmark = pytest.mark.one_blender
+
 FRAMES = range(1, 61)
 
 

@@ -95,6 +95,7 @@ def names_in(folder: Path) -> list[Path]:
     return sorted(folder.glob("*.bvh"))
 
 
+@pytest.mark.one_blender
 def test_every_damaged_file_is_imported_right_or_refused_with_the_line(shared_data: Data) -> None:
     scene: Any = bpy.context.scene
     scene.render.fps = 30

@@ -241,6 +241,7 @@ CHANGES: dict[str, Callable[[Any], None]] = {
 }
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES.keys())
 def test_what_is_made_live_is_what_the_button_makes(
     hero: Any, change: Callable[[Any], None]
@@ -709,6 +710,7 @@ RETARGETED: dict[str, Callable[[Any], None]] = {
 }
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("change", RETARGETED.values(), ids=RETARGETED.keys())
 def test_a_retarget_made_live_is_what_the_button_makes(
     walker: Any, change: Callable[[Any], None]

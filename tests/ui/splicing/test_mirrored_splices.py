@@ -19,7 +19,10 @@ from tests.referee.recording import moments, record
 from tests.referee.rest_poses import Bvh, along_x, anyhow, leaning, with_rest
 
 # Blender's importer leaves the file open.
-pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning"),
+    pytest.mark.one_blender,
+]
 
 SharedData = Callable[[str], Path]
 
