@@ -47,6 +47,8 @@ def main(arguments: Sequence[str]) -> int:
         "--keep", action="store_true", help="in docs/first_hour.md, if it went well"
     )
     chosen = parser.parse_args(arguments)
+    if chosen.keep and chosen.steps:
+        parser.error("Only the whole hour is kept: name no steps, or leave out --keep.")
     words = shlex.split(os.environ.get("BLENDER") or "blender", posix=not WINDOWS)
     if missing := no_window(words[0]):
         print(f"Not tried in a window: {missing}")
