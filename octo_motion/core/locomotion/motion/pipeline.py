@@ -715,7 +715,8 @@ def _take_time(
     *,
     cyclic: bool,
 ) -> Floats | None:
-    """Let bones that would turn too fast for an eye take their time, off the ground.
+    """Let bones that would turn too fast for an eye take their time, off the ground; but where
+    nothing is to be evened out, and arms are to be at every corner of the gait's table in time.
 
     Radians (moments − stride, bones) by which they turn within a frame, if none did.
     """
@@ -729,6 +730,8 @@ def _take_time(
     frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
     before, rate, per_cycle = arms.rotations, job.timing.rate, plan.pace.fastest
     turning = turns_in_world(frames, before, going[1], every)
+    if not any(gait.poser.settings.smoothing_cycles for gait in plan.segments.gaits):
+        return turning
     for number in range(_EASINGS):
         eased = eased_turns(
             *(frames, arms.rotations, going[1], held),
