@@ -5,7 +5,6 @@ The chest is that of its joints (shoulders, neck, spine) on average over the cli
 bone: a shrug does not tilt it.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise, permutations
 
@@ -29,12 +28,13 @@ from octo_motion.core.splicing.transfer.parts import PARTS
 from octo_motion.core.splicing.transfer.splice import Splice
 from tests.bench.splice_joints import joints_at
 from tests.blender.test_splice_laws import GOALS, SharedData, people
-from tests.core.splice_bodies import reference_poses_found_once, spliced
+from tests.core.splice_bodies import spliced
 from tests.referee.clip_measures import angle, chest
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning"),
     pytest.mark.one_blender,
+    pytest.mark.usefixtures("reference_poses"),
 ]
 
 PEOPLE = (
@@ -48,12 +48,6 @@ PEOPLE = (
     "animated_drawings/rokoko_jesse_dance.bvh",
     "makehuman/walk1.bvh",
 )
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _reference_poses() -> Iterator[None]:
-    with reference_poses_found_once():
-        yield
 
 
 class Person:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What must hold of splicing, on recorded motion."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -37,7 +37,7 @@ from octo_motion.core.splicing.transfer.reference_pose import ReferencePose
 from octo_motion.core.splicing.transfer.retarget import MappedClip, ReferredClip
 from octo_motion.core.splicing.transfer.splice import LimbGoal, Splice, build_splices
 from tests.bench.splice_quality import feet_at_rest, limb_length
-from tests.core.splice_bodies import reference_poses_found_once, spliced
+from tests.core.splice_bodies import spliced
 
 LEFT_ARM, LEGS, RIGHT_ARM = (PARTS[name] for name in ("left_arm", "legs", "right_arm"))
 
@@ -45,6 +45,7 @@ LEFT_ARM, LEGS, RIGHT_ARM = (PARTS[name] for name in ("left_arm", "legs", "right
 pytestmark = [
     pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning"),
     pytest.mark.one_blender,
+    pytest.mark.usefixtures("reference_poses"),
 ]
 
 SharedData = Callable[[str], Path]
@@ -71,12 +72,6 @@ OTHERS = (
 )
 CLIPS = (*(f"secondlife/avatar_{name}.bvh" for name in SECOND_LIFE), *OTHERS)
 GOALS: tuple[LimbGoal, ...] = ("direction", "exact")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _reference_poses() -> Iterator[None]:
-    with reference_poses_found_once():
-        yield
 
 
 @cache

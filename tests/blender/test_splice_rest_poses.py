@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """No rest pose changes what a splice gives: clips of others, rewritten with other rest poses."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -16,8 +16,8 @@ from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.humanoid.mapping import map_skeleton
 from octo_motion.core.splicing.transfer.parts import LEG, PARTS
 from octo_motion.core.splicing.transfer.splice import Splice
-from tests.blender.test_splice_laws import height, load, positions
-from tests.core.splice_bodies import reference_poses_found_once, spliced
+from tests.blender.test_splice_laws import height, imported, positions
+from tests.core.splice_bodies import spliced
 from tests.referee.recording import Floats
 from tests.referee.rest_poses import (
     Bvh,
@@ -33,6 +33,7 @@ from tests.referee.rest_poses import (
 pytestmark = [
     pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning"),
     pytest.mark.one_blender,
+    pytest.mark.usefixtures("reference_poses"),
 ]
 
 SharedData = Callable[[str], Path]
@@ -56,7 +57,7 @@ Mapped = Callable[..., tuple[Clip, Landmarks]]
 def mapped(
     add_on: None,  # noqa: ARG001
     tmp_path_factory: pytest.TempPathFactory,
-) -> Iterator[Mapped]:
+) -> Mapped:
     """A clip, as it is or rewritten with another rest pose, and its landmarks; read once each."""
 
     @cache
@@ -64,11 +65,10 @@ def mapped(
         if rest is not None:
             other = tmp_path_factory.mktemp("rests") / path.name
             path = with_rest(Bvh.read(path), rest).write(other)
-        clip, _ = load(path)
+        clip, _ = imported(path)
         return clip, map_skeleton(clip.skeleton, average_pose(clip)).landmarks
 
-    with reference_poses_found_once():
-        yield read
+    return read
 
 
 @pytest.mark.parametrize("rest", RESTS)

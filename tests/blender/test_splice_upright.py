@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Upright onto upright stays upright, on all pairs of recorded people, measured from joints."""
 
-from collections.abc import Iterator
 from itertools import permutations
 
 import numpy as np
@@ -14,12 +13,13 @@ from octo_motion.core.splicing.humanoid.landmarks import Landmarks
 from octo_motion.core.splicing.transfer.parts import PARTS
 from octo_motion.core.splicing.transfer.splice import Splice
 from tests.blender.test_splice_laws import SharedData, load, people
-from tests.core.splice_bodies import reference_poses_found_once, spliced
+from tests.core.splice_bodies import spliced
 from tests.referee.clip_measures import angle, lean
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning"),
     pytest.mark.one_blender,
+    pytest.mark.usefixtures("reference_poses"),
 ]
 
 PEOPLE = (
@@ -34,12 +34,6 @@ PEOPLE = (
     "misc/assimp_Boxing_Toes.bvh",
     "rigs_with_actions/KayKit_Knight.glb",
 )
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _reference_poses() -> Iterator[None]:
-    with reference_poses_found_once():
-        yield
 
 
 def trunk(clip: Clip, marks: Landmarks) -> dict[str, Floats]:

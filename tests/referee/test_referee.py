@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import bpy
@@ -12,7 +13,8 @@ import pytest
 from tests.referee import creature_measures as measures
 from tests.referee.__main__ import beyond_limits, limit_of
 from tests.referee.creatures import Figure
-from tests.referee.recording import Floats, Recording, moments, record
+from tests.referee.held_ground import Held, HeldGround, held
+from tests.referee.recording import Floats, Recording, Skin, moments, record
 from tests.referee.surface import Surface
 
 FPS = 24.0
@@ -92,6 +94,54 @@ def test_what_the_body_carries_along_does_not_rest() -> None:
 def test_what_is_in_the_air_does_not_rest() -> None:
     raised = np.tile([0.0, 0.0, 0.05], (48, 1))
     assert measures.resting(lying(raised), [ARM], ground(), LENGTH).share == 0.0
+
+
+def held_on_a_wall(places: Floats) -> Held:
+    """How an arm with a skin along its bones keeps to a wall that faces -y; (moments, 3) where the
+    arm begins.
+    """
+    along = np.linspace(0.0, 0.999, 400)
+    skin = Skin(
+        points=places[:, None] + along[:, None] * [1.0, 0.0, 0.0],
+        rest=along[:, None] * [1.0, 0.0, 0.0],
+        edges=np.empty((0, 2), dtype=np.int64),
+        faces=[],
+        bones=1 + (along * 4.0).astype(int),
+        web=np.zeros(len(along), dtype=bool),
+    )
+    corners = 3.0 * np.array(
+        [[-1.0, 0.0, -1.0], [1.0, 0.0, -1.0], [1.0, 0.0, 1.0], [-1.0, 0.0, 1.0]]
+    )
+    wall = np.broadcast_to(corners, (len(places), 4, 3))
+    ground = HeldGround(wall, np.array([[0, 1, 2], [0, 2, 3]]), 1.0)
+    return held(replace(lying(places), skins=[skin]), [ARM], ground, LENGTH)
+
+
+def test_an_arm_that_holds_a_wall_is_neither_in_it_nor_drifts() -> None:
+    found = held_on_a_wall(np.tile([0.0, -0.005, 0.0], (48, 1)))
+    assert found.holds == len(ARM)
+    assert found.drift.value == found.sink.value == 0.0
+
+
+@pytest.mark.parametrize("depth", [0.003, 0.2])
+def test_skin_in_a_wall_is_as_deep_as_it_is_and_told_with_its_frame(depth: float) -> None:
+    places = np.tile([0.0, -0.005, 0.0], (48, 1))
+    places[31, 1] = depth
+    found = held_on_a_wall(places)
+    assert found.sink.value == pytest.approx(depth)
+    assert found.sink.frame == 31.0
+
+
+def test_an_arm_that_creeps_along_a_wall_is_seen_over_its_whole_hold() -> None:
+    creep = np.linspace(0.0, 0.1, 48)[:, None] * [0.0, 0.0, 1.0] + [0.0, -0.005, 0.0]
+    found = held_on_a_wall(creep)
+    assert found.drift.value == pytest.approx(0.1 * 23.0 / 47.0, rel=0.05)
+
+
+def test_what_is_farther_from_a_wall_than_skin_lies_does_not_hold_it() -> None:
+    for far in (0.05, 0.8):
+        found = held_on_a_wall(np.tile([0.0, -far, 0.0], (48, 1)))
+        assert (found.holds, found.sink.value) == (0, 0.0)
 
 
 def test_a_bone_that_turns_is_told_with_its_frame() -> None:

@@ -23,8 +23,6 @@ from tests.blender.test_ground import make_mesh
 from tests.ui.made import Made, prepare
 from tests.ui.rig import Octopus, click, generate, give_route, joints_in_world, make_octopus
 
-pytestmark = pytest.mark.one_blender
-
 WAY = ((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, -1.6, 0.0), (0.6, -2.0, 0.0))
 OF_ARM = 0.01
 """The most that a foot may slip, in arm lengths."""
