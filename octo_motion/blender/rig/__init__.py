@@ -35,6 +35,7 @@ from .armature import (
     world_of,
 )
 from .controlled_puppet import puppet_of
+from .controls import leading_objects
 from .limb_figures import LimbReader
 from .puppet import Puppet
 from .puppet_reading import (
@@ -67,6 +68,7 @@ __all__ = [
     "hidden_bones",
     "is_driven_object",
     "is_part_of",
+    "leading_objects",
     "linked_names",
     "mark_bones",
     "may_play_otherwise",

@@ -82,7 +82,7 @@ class ControlledPuppet(Puppet):
     def __init__(self, armature: bpy.types.Object, rig: PuppetRig) -> None:
         super().__init__(armature, rig)
         names = rig.figure.names
-        bent = bent_bones(armature)
+        bent = bent_bones(armature, wholly=True)
         needed = set().union(*rig.needs.values())
         found = control_names(armature, needed) + correction_names(armature, needed)
         self._limbs = {

@@ -24,7 +24,7 @@ _MECHANISM: Final = re.compile(r"(DEF|ORG|MCH|VIS)-", re.IGNORECASE)
 _CORRECTION: Final = re.compile(r".*tweak", re.IGNORECASE)
 """Names of controls that only correct, by a little, what others do."""
 _READ_BONE: Final = re.compile(r'pose\.bones\["((?:[^"\\]|\\.)*)"\]')
-_FULL: Final = 1.0 - 1e-6
+FULL: Final = 1.0 - 1e-6
 _TRIED: Final = 0.1
 """Radians, and shares of the rig's length, by which controls are moved to see what they bend."""
 _TRIES: Final = 3
@@ -53,7 +53,7 @@ def hangs_on(armature: bpy.types.Object) -> dict[str, set[str]]:
             targets = _targets(constraint, armature.name)
             own: Any = constraint
             replaces = own.type == "COPY_TRANSFORMS" and own.mix_mode == "REPLACE"
-            if replaces and targets and constraint.influence >= _FULL:
+            if replaces and targets and constraint.influence >= FULL:
                 # Whatever came before is gone.
                 needed = targets
                 continue
@@ -92,6 +92,23 @@ def goal_bones(armature: bpy.types.Object) -> set[str]:
         for each in armature_data(armature).bones[name].parent_recursive
     }
     return goals - chained - carried
+
+
+def leading_objects(armature: bpy.types.Object) -> dict[str, list[str]]:
+    """Objects that are neither bones of the armature nor carried by some, by name, with the bones
+    that inverse kinematics bend after them: no key of a bone moves those.
+    """
+    assert armature.pose is not None
+    found: dict[str, list[str]] = {}
+    for bone in armature.pose.bones:
+        for constraint in bone.constraints:
+            own: Any = constraint
+            if own.type not in {"IK", "SPLINE_IK"} or not acts(own) or own.target is None:
+                continue
+            inside = own.target == armature
+            if not inside and not _bones_behind(own.target, own.subtarget, armature.name):
+                found.setdefault(own.target.name, []).extend(ik_chain(bone, own))
+    return found
 
 
 @dataclass(frozen=True)

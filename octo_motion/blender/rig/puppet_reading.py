@@ -45,7 +45,7 @@ from .armature import (
     read_skeleton,
     vertex_positions,
 )
-from .controls import control_names, goal_bones, hangs_on, ik_chain, reaches, stiff_joints
+from .controls import FULL, control_names, goal_bones, hangs_on, ik_chain, reaches, stiff_joints
 
 MARK: Final = "octo_motion_puppet"
 """Custom property of a bone: "BODY" or "FOLLOW", where the artist has decided it."""
@@ -205,7 +205,8 @@ def _roles(
             skeleton.names[above] for each in found.bodies for above in skeleton.ancestors(each)
         }
         beside = set().union(*(needs[each] for each in lost if each in limbs)) - limbs - carried
-        if control_names(armature, beside | (limbs & carried_bones(armature))):
+        own = carried_bones(armature) | (bent - bent_bones(armature, wholly=True))
+        if control_names(armature, beside | (limbs & own)):
             return found, {name: frozenset(needs[name]) for name in limbs}
     return roles or find_roles(skeleton, facts, armature.name), {}
 
@@ -344,14 +345,18 @@ def _followed(armature: bpy.types.Object) -> str:
     return others.most_common(1)[0][0] if others else ""
 
 
-def bent_bones(armature: bpy.types.Object) -> set[str]:
-    """Names of the bones that inverse kinematics bend."""
+def bent_bones(armature: bpy.types.Object, *, wholly: bool = False) -> set[str]:
+    """Names of the bones that inverse kinematics bend; ``wholly``, so that nothing is left of how
+    they turn by themselves.
+    """
     assert armature.pose is not None
+    least = FULL if wholly else 0.0
     return {
         each
         for bone in armature.pose.bones
         for constraint in bone.constraints
         if constraint.type in {"IK", "SPLINE_IK"} and acts(constraint)
+        if constraint.influence >= least
         for each in ik_chain(bone, constraint)
     }
 

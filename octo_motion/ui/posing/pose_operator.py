@@ -4,16 +4,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import bpy
 
 from ...blender.files import own_folder
-from ...blender.rig import active_armature
+from ...blender.rig import active_armature, leading_objects
 from ...core.errors import OctoMotionError, SettingsError
-from ...core.phrases import joined_phrases, phrase
+from ...core.phrases import Phrase, joined_phrases, phrase
 from ...device.ipc import ALONE, Client
 from .. import at_work
 from ..language import reported, translated
@@ -70,6 +70,8 @@ class SessionOperator(ArmatureOperator):
             self._timer = window_manager.event_timer_add(_RATE, window=window)
             window_manager.modal_handler_add(cast("bpy.types.Operator", self))
             at_work.begun(self, partial(self._end, keep=True))
+            for text in moved_otherwise(self._session):
+                self.report({"WARNING"}, reported(text))  # type: ignore[attr-defined]
         except OctoMotionError as error:
             return self._fail(context, error)
         except BaseException:
@@ -135,6 +137,21 @@ class SessionOperator(ArmatureOperator):
             if timer is not None and context.window_manager is not None:
                 context.window_manager.event_timer_remove(timer)
             tell(context, None)
+
+
+def moved_otherwise(session: PuppetSession) -> Iterator[Phrase]:
+    """What is to be said of bones that neither a hand nor a key of theirs moves."""
+    driven = len(session.puppet.rig.roles.driven)
+    if driven:
+        yield phrase("Constraints or drivers move {driven} of its bones", driven=driven)
+    for name, bones in leading_objects(session.puppet.armature()).items():
+        yield phrase(
+            "'{object}' leads {count} of its bones ('{example}') and is none itself: move it, or "
+            "mute the constraint.",
+            object=name,
+            count=len(bones),
+            example=bones[0],
+        )
 
 
 def handled(
@@ -207,14 +224,6 @@ class OCTO_MOTION_OT_pose_start(SessionOperator, bpy.types.Operator):
         self._client = Client(log_file=own_folder() / "simulation.log")
         self._client.start_soon((ALONE,))
         session.core.share(self._client)
-        driven = len(session.puppet.rig.roles.driven)
-        if driven:
-            self.report(
-                {"WARNING"},
-                reported(
-                    phrase("Constraints or drivers move {driven} of its bones", driven=driven)
-                ),
-            )
         self._last = time.perf_counter()
         tell(context, self._controls.status(), self._controls.help)
         return Overlay(self._controls)

@@ -12,6 +12,7 @@ import pytest
 
 from octo_motion.core.errors import RigError
 from octo_motion.core.rotations import Floats
+from octo_motion.ui.posing.pose_operator import moved_otherwise
 from octo_motion.ui.posing.puppet_session import PuppetSession
 
 from .test_posing_odd_rigs import rig
@@ -52,6 +53,28 @@ def by_goal_and_pole() -> Any:
         armature.data.bones[name].use_deform = False
     ik = constrain(armature, "shin", "IK", "goal", chain_count=2)
     ik.pole_target, ik.pole_subtarget, ik.pole_angle = armature, "pole", float(np.radians(-90.0))
+    return armature
+
+
+def by_half() -> Any:
+    """The same, of which inverse kinematics do but half: the other half is the bones' own."""
+    armature = by_goal_and_pole()
+    armature.pose.bones["shin"].constraints[0].influence = 0.5
+    bpy.context.view_layer.update()
+    return armature
+
+
+def by_object(**settings: Any) -> Any:
+    """The leg reaches for an empty, which is no bone."""
+    armature = by_goal_and_pole()
+    empty = bpy.data.objects.new("Target", None)
+    bpy.context.collection.objects.link(empty)
+    empty.location = armature.pose.bones["goal"].head
+    ik: Any = armature.pose.bones["shin"].constraints[0]
+    ik.target, ik.pole_target = empty, None
+    for name, value in settings.items():
+        setattr(ik, name, value)
+    bpy.context.view_layer.update()
     return armature
 
 
@@ -114,6 +137,7 @@ def by_child_of() -> Any:
 
 RIGS: dict[str, tuple[Callable[[], Any], str, set[str]]] = {
     "goal and pole": (by_goal_and_pole, "", {"goal", "pole"}),
+    "half": (by_half, "", {"thigh"}),
     "hidden beneath": (lambda: deforming(by_goal_and_pole()), "DEF-", {"goal", "pole"}),
     "driver": (by_driver, "", {"lever", "thigh"}),
     "child of": (by_child_of, "", {"thigh"}),
@@ -171,7 +195,7 @@ def test_controls_get_the_keys_that_give_the_pose_of_a_limb_that_was_pulled(name
     assert set(names) == keyed(armature)
     assert set(names) & controls
     # Nothing of what a constraint or a driver bends is keyed: its keys would have no effect.
-    bent = {"shin"} if name != "child of" else set()
+    bent = {"shin"} if name not in {"child of", "half"} else set()
     assert not set(names) & (bent | {f"DEF-{each}" for each in LIMBS})
     for control in armature.pose.bones:
         control.matrix_basis.identity()
@@ -224,6 +248,36 @@ def test_what_the_controls_cannot_reach_is_said() -> None:
     drag(session, "shin", (0.1, -0.25, 0.2))
     session.settle()
     assert "its controls do not reach" in session.missed
+    session.cancel()
+
+
+def test_object_that_leads_a_limb_and_is_no_bone_is_named() -> None:
+    session = PuppetSession(by_object(), bpy.context.scene, clock=None)
+    driven, leads = map(str, moved_otherwise(session))
+    session.cancel()
+    assert driven == "Constraints or drivers move 2 of its bones"
+    told = "'Target' leads 2 of its bones ('shin') and is none itself: move it, or mute the"
+    assert leads == f"{told} constraint."
+
+
+def test_object_that_a_bone_carries_or_that_leads_no_more_is_not_named() -> None:
+    armature = by_object()
+    empty = bpy.data.objects["Target"]
+    empty.parent, empty.parent_type, empty.parent_bone = armature, "BONE", "goal"
+    bpy.context.view_layer.update()
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    assert not [*moved_otherwise(session)]
+    session.cancel()
+    session = PuppetSession(by_object(mute=True), bpy.context.scene, clock=None)
+    assert not [*moved_otherwise(session)]
+    session.cancel()
+
+
+def test_limb_that_follows_an_object_by_half_is_posed_by_its_own_bones() -> None:
+    session = PuppetSession(by_object(influence=0.5), bpy.context.scene, clock=None)
+    assert {"thigh", "shin"} <= set(session.figure.names)
+    drag(session, "thigh", (0.0, -0.2, 0.05))
+    assert "thigh" in session.key()
     session.cancel()
 
 
