@@ -48,6 +48,17 @@ def test_components_first_the_operations_are_the_same() -> None:
         np.testing.assert_allclose(found, expected, atol=1e-14)
 
 
+def test_few_are_the_same_to_the_last_bit_as_among_many() -> None:
+    a, b = np.random.default_rng(6).normal(size=(2, 4, 35, 20))
+    u, v = np.random.default_rng(7).normal(size=(2, 5, 3, 700))
+    turns, vectors = components_first.multiply(a, b), components_first.cross(u, v)
+    few = components_first.multiply(a[:, :7], b[:, :7])
+    np.testing.assert_array_equal(few, turns[:, :7])
+    np.testing.assert_array_equal(components_first.multiply(a[:, 0], b[:, 0]), turns[:, 0])
+    few = components_first.cross(u[..., :7], v[..., :7])
+    np.testing.assert_array_equal(few, vectors[..., :7])
+
+
 def test_scalars_do_the_same_as_arrays() -> None:
     a, b = normalized([[0.9, -0.2, 0.4, 0.1], [-0.3, 0.5, 0.2, 0.7]])
     one: scalars.Quaternion = (float(a[0]), float(a[1]), float(a[2]), float(a[3]))

@@ -676,8 +676,10 @@ class RoughGaitPoser(GaitPoser):
         """The same as high as it is exactly, if it is as far off as of another gait the rough one
         is.
         """
+        # Before the copy, which then has the cycle that was looked at for it.
+        clearance = self.clearance + exact.clearance - rough.clearance
         result = copy(self)
-        result.__dict__["clearance"] = self.clearance + exact.clearance - rough.clearance
+        result.__dict__["clearance"] = clearance
         return result
 
 

@@ -72,30 +72,43 @@ class BodyLine:
 
         Seen from above the body stays on its route; a slope is as far below as level ground is.
         """
-        upright = normalized(self._at(self.uprights, distance))
-        centre = positions.copy()
-        clearance = self._at(self.clearances, distance)
-        centre[..., 2] = self._at(self.heights, distance) + clearance / upright[..., 2]
-        return centre, upright
+        return _above(positions, self._at(self._table[:, :5], distance))
 
     def at(self, distance: ArrayLike) -> tuple[Floats, Floats]:
         """World positions (…, 3) and orientations (…, 4) of the body at distances (…,)."""
-        wanted = np.asarray(distance, dtype=np.float64)
+        there = self._at(self._table, np.asarray(distance, dtype=np.float64))
         # As near to the route as footholds need: it costs a tenth of asking the route itself.
-        centre, upright = self.ride(self._at(self.ways, wanted), wanted)
-        return centre, leaning(upright, normalized(self._at(self.turns, wanted)))
+        centre, upright = _above(there[..., 5:8], there[..., :5])
+        return centre, leaning(upright, normalized(there[..., 8:]))
+
+    @cached_property
+    def _table(self) -> Floats:
+        """(n, 12) heights, clearances, uprights, ways and turns: all is asked for at once."""
+        return np.column_stack(
+            [self.heights, self.clearances, self.uprights, self.ways, self.turns]
+        )
 
     def _at(self, table: Floats, distance: Floats) -> Floats:
-        """The table at distances (…,), by the cubic through its neighbours' slopes."""
+        """Rows of the table at distances (…,), by the cubic through its neighbours' slopes."""
         place = (distance - self.start) / self.spacing
         place = np.minimum(np.maximum(place, 1.0), len(table) - 2.001)
         index = place.astype(np.int64)
-        t = (place - index).reshape(*place.shape, *[1] * (table.ndim - 1))
+        t = (place - index)[..., None]
         before, here, then, after = (table[index + step] for step in (-1, 0, 1, 2))
         slope, last = 0.5 * (then - before), 0.5 * (after - here)
         rise = then - here
         bend = slope + last - 2.0 * rise
         return here + t * (slope + t * (rise - slope - bend + t * bend))
+
+
+def _above(positions: Floats, there: Floats) -> tuple[Floats, Floats]:
+    """Centres (…, 3) above points of the way, and uprights (…, 3), by height, clearance and upright
+    (…, 5).
+    """
+    upright = normalized(there[..., 2:5])
+    centre = positions.copy()
+    centre[..., 2] = there[..., 0] + there[..., 1] / upright[..., 2]
+    return centre, upright
 
 
 def leaning(upright: Floats, rotations: Floats) -> Floats:
