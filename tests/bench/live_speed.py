@@ -51,8 +51,8 @@ def text(results: Any) -> str:
         f"{'':>44} {'seconds':>9} {'slowest':>9} {'processor':>10}",
     ]
     lines += [
-        f"{each['what']:<44} {each["seconds"]:>9.3f} {each["slowest"]:>9.3f} "
-        f"{each["cpu_seconds"]:>10.3f}"
+        f"{each['what']:<44} {each['seconds']:>9.3f} {each['slowest']:>9.3f} "
+        f"{each['cpu_seconds']:>10.3f}"
         for each in results
     ]
     note = f"median of {_CHANGES} changes; processor: by the processor's time, likewise"
