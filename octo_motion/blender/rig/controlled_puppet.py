@@ -18,7 +18,7 @@ from mathutils import Matrix, Vector
 from ...core.errors import WriteError
 from ...core.phrases import phrase
 from ...core.posing.control_fit import ControlFit
-from ...core.posing.puppet import Pose, turned_bodies
+from ...core.posing.puppet import Pose, closed, turned_bodies
 from ...core.rotations import Floats, angle_between
 from .armature import even_scale
 from .controls import (
@@ -81,17 +81,11 @@ class ControlledPuppet(Puppet):
 
     def __init__(self, armature: bpy.types.Object, rig: PuppetRig) -> None:
         super().__init__(armature, rig)
-        names = rig.figure.names
         bent = bent_bones(armature, wholly=True)
         needed = set().union(*rig.needs.values())
         found = control_names(armature, needed) + correction_names(armature, needed)
-        self._limbs = {
-            control: frozenset(
-                body for body, name in enumerate(names) if control in rig.needs[name]
-            )
-            for control in found
-            if not (control in rig.needs and control in bent)
-        }
+        free = [each for each in found if not (each in rig.needs and each in bent)]
+        self._limbs = {each: _hanging(rig, each) for each in free}
         """Of each control the bodies that hang on it."""
         self._needs = hangs_on(armature)
         self._trunk = rig.roles.parents.index(-1)
@@ -150,6 +144,16 @@ class ControlledPuppet(Puppet):
         self._keep(told)
         self._go_on(self._goal)
         return told
+
+    def shown_for(self, pose: Pose) -> Pose:
+        shown = self._shown()
+        apart = closed(self.figure, pose).positions - closed(self.figure, shown).positions
+        if np.linalg.norm(apart, axis=1).max() <= _TOLD * self._size * self.rig.unit:
+            return pose
+        self._goal = shown
+        self._keep("")
+        self._go_on(shown)
+        return shown
 
     def local(self, pose: Pose) -> tuple[Floats, Floats]:  # noqa: ARG002
         """Of bones that something else moves no rotation could be recorded.
@@ -350,21 +354,17 @@ class ControlledPuppet(Puppet):
             for name in names
         ]
         counts = [each.count for each in self._moving]
-        count = sum(counts)
         self._fit = None
-        if not count:
+        if not sum(counts):
             return
-        limbs = np.zeros((count, 3, len(self.figure), 3), dtype=bool)
-        targets = [bones[bone].name for bone in self._points.targets]
-        led = np.zeros((count, len(targets), 3), dtype=bool)
-        start = 0
-        for each in self._moving:
-            rows = slice(start, start + each.count)
-            limbs[rows, :, sorted(self._limbs[each.name])] = True
-            led[rows] = [[each.name in self._needs[target]] * 3 for target in targets] or False
-            start += each.count
-        moves = np.concatenate([limbs.reshape(count, -1), led.reshape(count, -1)], axis=1)
-        self._fit = ControlFit(self._shape, counts, moves)
+        moving = [each.name for each in self._moving]
+        limbs = np.zeros((len(moving), 3, len(self.figure), 3), dtype=bool)
+        for row, name in enumerate(moving):
+            limbs[row, :, sorted(self._limbs[name])] = True
+        needs = [self._needs[bones[bone].name] for bone in self._points.targets]
+        led = [[name in need for need in needs for _ in range(3)] for name in moving]
+        moves = np.concatenate([limbs.reshape(len(moving), -1), np.array(led, dtype=bool)], axis=1)
+        self._fit = ControlFit(self._shape, counts, np.repeat(moves, counts, axis=0))
 
     def _shape(self, values: Floats) -> Floats:
         armature = self.armature()
@@ -376,6 +376,12 @@ class ControlledPuppet(Puppet):
             each.write(bone, values[start : start + each.count], own_size)
             start += each.count
         return self._points.shown(armature)
+
+
+def _hanging(rig: PuppetRig, control: str) -> frozenset[int]:
+    """Bodies that hang on a control."""
+    names = rig.figure.names
+    return frozenset(body for body, name in enumerate(names) if control in rig.needs[name])
 
 
 def _beginning_at(bodies: set[int], limbs: Sequence[frozenset[int]]) -> list[int]:

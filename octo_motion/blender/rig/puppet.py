@@ -73,13 +73,15 @@ class Puppet:
         return found
 
     def read(self) -> Pose:
-        """Where the bodies are, as the armature is shown now."""
+        """Where the bodies are, as the armature is shown now; it goes on from there."""
+        self._written = self._shown()
+        return self._written
+
+    def _shown(self) -> Pose:
         armature = self.armature()
         posed = posed_bones(armature, even_scale(armature), self.rig.skeleton)
         bodies = list(self.rig.roles.bodies)
-        pose = Pose(posed.heads[bodies] * self.rig.unit, posed.rotations[bodies])
-        self._written = pose
-        return pose
+        return Pose(posed.heads[bodies] * self.rig.unit, posed.rotations[bodies])
 
     def write(self, pose: Pose) -> list[str]:
         """Give bones the pose; the names of those whose values have changed."""
@@ -120,6 +122,12 @@ class Puppet:
     def settle(self) -> str:
         """See to it that the bones show the pose that was written; what cannot be, in words."""
         return ""
+
+    def shown_for(self, pose: Pose) -> Pose:
+        """What is shown in place of a pose that was settled and could not be; else that pose. It
+        goes on from there.
+        """
+        return pose
 
     def keyed(self, bodies: Iterable[int], *, all_bones: bool = False) -> list[tuple[str, bool]]:  # noqa: ARG002
         """Bones that get keys for bodies, and whether they are placed as well as turned."""

@@ -172,6 +172,16 @@ class Company:
         """See to it that the bones show the pose that was written; what cannot be, in words."""
         return "  ".join(filter(None, [puppet.settle() for puppet in self._puppets()]))
 
+    def shown_for(self, pose: Pose) -> Pose:
+        """What is shown in place of a pose that was settled and could not be."""
+        others = [
+            each.seen(each.puppet.shown_for(each.own(part_of_pose(pose, span))))
+            for each, span in self.partners_with()
+        ]
+        things = [part_of_pose(pose, range(body, body + 1)) for _, body in self.things_with()]
+        main = self.main.shown_for(part_of_pose(pose, self.own))
+        return joined_poses([main, *others, *things])
+
     def with_followers(self, bodies: Iterable[int]) -> list[int]:
         """Bodies that were turned, and those whose bones have other values because of it."""
         turned = set(bodies)

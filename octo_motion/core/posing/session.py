@@ -424,6 +424,14 @@ class Session:
         self.pulled = None
         self.wake()
 
+    def come_to(self, pose: Pose) -> None:
+        """The same where something else than hands and joints has led there: what was pulled stays
+        what was pulled.
+        """
+        pulled = self.pulled
+        self.show(pose)
+        self.pulled = pulled
+
     def restore(self) -> None:
         self.release()
         self.remember()

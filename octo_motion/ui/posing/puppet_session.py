@@ -496,6 +496,8 @@ class PuppetSession(RecordedPuppet):
         """Whether it is over."""
         self._moving = False
         """Whether what the bones show is on its way."""
+        self._let_go = False
+        """Whether a hand has let go of what moves since."""
         self.report: TickReport | None = None
         self._trouble: OctoMotionError | None = None
         self._one_thread = OneThread()
@@ -513,6 +515,7 @@ class PuppetSession(RecordedPuppet):
             return []
         self.core.release(spring)
         self.settle()
+        self._let_go = True
         mark_file_changed()
         tools = self.scene().tool_settings
         if tools.use_keyframe_insert_auto and self._recording is None:
@@ -576,6 +579,10 @@ class PuppetSession(RecordedPuppet):
         elif self._moving:
             self._moving = False
             self.settle()
+            if self._let_go and self.missed:
+                # It is where one sees it, and can be taken hold of there.
+                self.core.come_to(self.puppet.shown_for(self.core.pose))
+            self._let_go = False
         return self.report
 
     def measure(self, body: int) -> None:

@@ -240,14 +240,54 @@ def test_pole_is_not_carried_by_its_goal(muted: bool) -> None:  # noqa: FBT001
 
 
 def test_what_the_controls_cannot_reach_is_said() -> None:
+    session = PuppetSession(locked(), bpy.context.scene, clock=None)
+    drag(session, "shin", (0.1, -0.25, 0.2))
+    session.settle()
+    assert "its controls do not reach" in session.missed
+    session.cancel()
+
+
+def locked() -> Any:
+    """Of the goal's rig nothing but the pole can be moved."""
     armature = by_goal_and_pole()
     for name in ("root", "hips", "pole", "goal"):
         armature.pose.bones[name].lock_location = (name != "pole",) * 3
         armature.pose.bones[name].lock_rotation = (True, True, True)
+    return armature
+
+
+def test_limb_can_be_taken_hold_of_where_its_controls_have_left_it() -> None:
+    armature = locked()
+    start = joints(armature, "")
     session = PuppetSession(armature, bpy.context.scene, clock=None)
     drag(session, "shin", (0.1, -0.25, 0.2))
-    session.settle()
+    for _ in range(60):
+        session.tick(TICK)
+    assert session.core.resting
     assert "its controls do not reach" in session.missed
+    left = joints(armature, "")
+    np.testing.assert_allclose(wanted(session, ""), left[:, 0], atol=MILLIMETRE)
+    middle = left[LIMBS.index("shin")].mean(axis=0)
+    ahead = np.array([0.0, 1.0, 0.0])
+    hit = session.pick(middle - ahead, ahead, margin=0.001)
+    assert hit is not None
+    assert session.bone(hit.body) == "shin"
+
+    assert session.step_back()
+    np.testing.assert_allclose(joints(armature, ""), start, atol=1e-6)
+    assert session.step_forward()
+    np.testing.assert_allclose(joints(armature, ""), left, atol=1e-6)
+    session.cancel()
+
+
+def test_weight_that_pulls_a_limb_where_its_controls_do_not_lead_comes_to_rest() -> None:
+    armature = locked()
+    armature.octo_motion.posing.gravity = True
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    drag(session, "shin", (0.1, -0.25, 0.2))
+    for _ in range(600):
+        session.tick(TICK)
+    assert session.core.resting
     session.cancel()
 
 
