@@ -61,7 +61,7 @@ MOST_LIMBS: Final = 300
 
 _TOLERANT: Final = frozenset({"LIMIT_ROTATION", "LIMIT_LOCATION", "LIMIT_SCALE", "MAINTAIN_VOLUME"})
 """Constraints under which a bone still turns as its keys say."""
-_CARRYING: Final = _TOLERANT | {"CHILD_OF"}
+_CARRYING: Final = _TOLERANT | {"CHILD_OF", "ARMATURE"}
 """Constraints under which it does too, though something else than its parent carries it."""
 _ANGLE_LIMIT: Final = 2.0 * np.pi - 1e-4
 """A range as wide as a whole turn limits nothing; less what single precision loses of it."""

@@ -135,12 +135,24 @@ def by_child_of() -> Any:
     return armature
 
 
+def by_armature() -> Any:
+    """The same, by the constraint that lets bones follow others as skin does."""
+    armature = by_child_of()
+    thigh = armature.pose.bones["thigh"]
+    thigh.constraints.remove(thigh.constraints[0])
+    target = thigh.constraints.new("ARMATURE").targets.new()
+    target.target, target.subtarget = armature, "hips"
+    bpy.context.view_layer.update()
+    return armature
+
+
 RIGS: dict[str, tuple[Callable[[], Any], str, set[str]]] = {
     "goal and pole": (by_goal_and_pole, "", {"goal", "pole"}),
     "half": (by_half, "", {"thigh"}),
     "hidden beneath": (lambda: deforming(by_goal_and_pole()), "DEF-", {"goal", "pole"}),
     "driver": (by_driver, "", {"lever", "thigh"}),
     "child of": (by_child_of, "", {"thigh"}),
+    "armature": (by_armature, "", {"thigh"}),
 }
 
 
@@ -195,7 +207,7 @@ def test_controls_get_the_keys_that_give_the_pose_of_a_limb_that_was_pulled(name
     assert set(names) == keyed(armature)
     assert set(names) & controls
     # Nothing of what a constraint or a driver bends is keyed: its keys would have no effect.
-    bent = {"shin"} if name not in {"child of", "half"} else set()
+    bent = {"shin"} if name not in {"child of", "armature", "half"} else set()
     assert not set(names) & (bent | {f"DEF-{each}" for each in LIMBS})
     for control in armature.pose.bones:
         control.matrix_basis.identity()
