@@ -106,8 +106,9 @@ def leading_objects(armature: bpy.types.Object) -> dict[str, list[str]]:
             if own.type not in {"IK", "SPLINE_IK"} or not acts(own) or own.target is None:
                 continue
             inside = own.target == armature
-            if not inside and not _bones_behind(own.target, own.subtarget, armature.name):
-                found.setdefault(own.target.name, []).extend(ik_chain(bone, own))
+            chain = ik_chain(bone, own)
+            if chain and not inside and not _bones_behind(own.target, "", armature.name):
+                found.setdefault(own.target.name, []).extend(chain)
     return found
 
 

@@ -323,6 +323,14 @@ def test_object_that_a_bone_carries_or_that_leads_no_more_is_not_named() -> None
     session = PuppetSession(by_object(mute=True), bpy.context.scene, clock=None)
     assert not [*moved_otherwise(session)]
     session.cancel()
+    # Without a bone to bend there is nothing to lead.
+    armature = by_object(mute=True)
+    alone: Any = armature.pose.bones["root"].constraints.new("IK")
+    alone.target, alone.use_tail = bpy.data.objects["Target"], False
+    bpy.context.view_layer.update()
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    assert not [*moved_otherwise(session)]
+    session.cancel()
 
 
 def test_limb_that_follows_an_object_by_half_is_posed_by_its_own_bones() -> None:
