@@ -123,7 +123,7 @@ class ControlledPuppet(Puppet):
         known = self._stood_before()
         if known is not None:
             self._set(known.values)
-            self._go_on(self._goal)
+            self._go_on(self._shown() if known.told else self._goal)
             return known.told
         goal = self._points.of(self._goal)
         turned = self._turned()
@@ -142,17 +142,17 @@ class ControlledPuppet(Puppet):
             wanted |= set(np.flatnonzero(off > _TOLD).tolist())
         told = "" if off.max() <= _TOLD else _told(self.figure.names, off * self._size)
         self._keep(told)
-        self._go_on(self._goal)
+        # What was missed would count as shown, and be there still when the limb is back.
+        self._go_on(self._shown() if told else self._goal)
         return told
 
-    def shown_for(self, pose: Pose) -> Pose:
+    def shown_for(self, pose: Pose) -> Pose | None:
         shown = self._shown()
         apart = closed(self.figure, pose).positions - closed(self.figure, shown).positions
         if np.linalg.norm(apart, axis=1).max() <= _TOLD * self._size * self.rig.unit:
-            return pose
-        self._goal = shown
-        self._keep("")
+            return None
         self._go_on(shown)
+        self._keep("")
         return shown
 
     def local(self, pose: Pose) -> tuple[Floats, Floats]:  # noqa: ARG002

@@ -123,11 +123,11 @@ class Puppet:
         """See to it that the bones show the pose that was written; what cannot be, in words."""
         return ""
 
-    def shown_for(self, pose: Pose) -> Pose:
-        """What is shown in place of a pose that was settled and could not be; else that pose. It
-        goes on from there.
+    def shown_for(self, pose: Pose) -> Pose | None:  # noqa: ARG002
+        """What is shown in place of a pose that was settled and could not be, from where it goes
+        on; none where it is shown.
         """
-        return pose
+        return None
 
     def keyed(self, bodies: Iterable[int], *, all_bones: bool = False) -> list[tuple[str, bool]]:  # noqa: ARG002
         """Bones that get keys for bodies, and whether they are placed as well as turned."""

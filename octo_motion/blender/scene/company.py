@@ -172,15 +172,19 @@ class Company:
         """See to it that the bones show the pose that was written; what cannot be, in words."""
         return "  ".join(filter(None, [puppet.settle() for puppet in self._puppets()]))
 
-    def shown_for(self, pose: Pose) -> Pose:
-        """What is shown in place of a pose that was settled and could not be."""
-        others = [
-            each.seen(each.puppet.shown_for(each.own(part_of_pose(pose, span))))
-            for each, span in self.partners_with()
-        ]
-        things = [part_of_pose(pose, range(body, body + 1)) for _, body in self.things_with()]
-        main = self.main.shown_for(part_of_pose(pose, self.own))
-        return joined_poses([main, *others, *things])
+    def shown_for(self, pose: Pose) -> Pose | None:
+        """What is shown in place of a pose that was settled and could not be; none where it is."""
+        parts = [part_of_pose(pose, span) for span in self._spans]
+        found = [self.main.shown_for(parts[0])]
+        for part, partner in zip(parts[1:], self.partners, strict=False):
+            shown = partner.puppet.shown_for(partner.own(part))
+            found.append(None if shown is None else partner.seen(shown))
+        if all(each is None for each in found):
+            return None
+        found += [None] * len(self.things)
+        return joined_poses(
+            [other if one is None else one for one, other in zip(found, parts, strict=True)]
+        )
 
     def with_followers(self, bodies: Iterable[int]) -> list[int]:
         """Bodies that were turned, and those whose bones have other values because of it."""

@@ -577,13 +577,22 @@ class PuppetSession(RecordedPuppet):
             self.puppet.write(self.core.pose)
             self._moving = True
         elif self._moving:
-            self._moving = False
-            self.settle()
-            if self._let_go and self.missed:
-                # It is where one sees it, and can be taken hold of there.
-                self.core.come_to(self.puppet.shown_for(self.core.pose))
-            self._let_go = False
+            self._come_to_rest()
         return self.report
+
+    def _come_to_rest(self) -> None:
+        self._moving = False
+        self.settle()
+        if self._let_go and self.missed:
+            shown = self.puppet.shown_for(self.core.pose)
+            if shown is None:
+                # It has sprung back to where they do reach.
+                self.missed = ""
+            else:
+                # It is where one sees it, and can be taken hold of there.
+                self.core.come_to(shown)
+        # Only once: its own weight would lead it away again.
+        self._let_go = False
 
     def measure(self, body: int) -> None:
         """From now on the hand shows how the joint of a limb is to bend, and nothing resists.

@@ -498,3 +498,19 @@ def test_controls_of_a_scaled_object_are_led_as_those_of_one_that_is_not(scale: 
         found.append(joints(armature, "") / each)
     # As far as inverse kinematics leave open.
     assert np.linalg.norm(found[1] - found[0], axis=2).max() < 3.0 * MILLIMETRE
+
+
+def test_limb_that_springs_back_to_where_its_controls_reach_stays_there() -> None:
+    """What could not be shown on the way there leaves nothing behind."""
+    armature = locked()
+    armature.octo_motion.posing.material = "RUBBER"
+    start = joints(armature, "")
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    session.core.change(step=4e-3)
+    drag(session, "shin", (0.1, -0.25, 0.2))
+    for _ in range(300):
+        session.tick(TICK)
+    assert session.core.resting
+    assert session.missed == ""
+    np.testing.assert_allclose(joints(armature, ""), start, atol=5.0 * MILLIMETRE)
+    session.cancel()
