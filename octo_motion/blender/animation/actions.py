@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from operator import itemgetter
+from operator import is_not, itemgetter
 from typing import Any, Final
 
 import bpy
@@ -50,6 +50,7 @@ _TRAVELS: Final = 1e-4
 _BEING_WRITTEN: Final = ""
 """Fingerprint of an action while it gets its keys."""
 _KINDS: Final = ("interpolation", "handle_left_type", "handle_right_type", "type")
+_RANGE: Final = ("use_frame_range", "frame_start", "frame_end", "use_cyclic")
 _PLACES: Final = ("co", "handle_left", "handle_right")
 """All that is kept of a key."""
 CHANNELS_AT_ONCE: Final = 6
@@ -57,7 +58,7 @@ CHANNELS_AT_ONCE: Final = 6
 or so."""
 _CURVES_AT_ONCE: Final = 50
 """How many are read at one step to see whether they have been edited."""
-_TOLD_AT_ONCE: Final = 150
+_TOLD_AT_ONCE: Final = 90
 """How many Blender looks at anew at one step: after each of them it works the frame out again."""
 _LEAST_SPACING: Final = 0.01
 """Blender takes keys that are no further apart, in frames, for one and the same."""
@@ -196,11 +197,14 @@ def write_action(
     """
     times = _checked(frames, channels)
     action = generated_action(obj, name, previous, replaceable=replaceable)
-    channelbag = _dense_channelbag(action)
-    known = filled.curves if filled is not None and filled.name == action.name else {}
-    written = _Written()
-    deque(written.filling(channelbag, times, channels, known, automatic=automatic), maxlen=0)
-    _set_range(action, channelbag, times, repeats=repeats)
+    written, known = None, dict[tuple[str, int], _Filled]()
+    if filled is not None and filled.name == action.name:
+        written, known = filled.all_of(channels), filled.curves
+    if written is None:
+        channelbag = _dense_channelbag(action)
+        written = _Written()
+        deque(written.filling(channelbag, times, channels, known, automatic=automatic), maxlen=0)
+        _set_range(action, channelbag, times, repeats=repeats)
     if not beneath:
         assign_action(obj, action)
     _mark_written(action, obj.name, settings_note, len(times), written)
@@ -255,9 +259,11 @@ def _set_range(
     repeats: bool,
 ) -> None:
     _repeat(channelbag, repeats=repeats)
-    action.use_cyclic = repeats
-    action.use_frame_range = True
-    action.frame_start, action.frame_end = float(times[0]), float(times[-1])
+    own = (True, float(times[0]), float(times[-1]), repeats)
+    for name, value in zip(_RANGE, own, strict=True):
+        # Blender works all frames out anew where any is set.
+        if getattr(action, name) != value:
+            setattr(action, name, value)
 
 
 def _mark_written(
@@ -268,7 +274,7 @@ def _mark_written(
     written: _Written,
 ) -> None:
     tracks = _tracks_of(action)
-    fingerprint = deque(_fingerprint(action, written.digests), maxlen=1).pop()
+    fingerprint = written.fingerprint or written.seen_in(action)
     _mark(action, owner, settings_note, fingerprint, written.handles, keys=written.keys)
     action[MARK]["frames"] = frames
     for key, track in tracks.items():
@@ -347,8 +353,12 @@ def assign_action(obj: bpy.types.Object, action: bpy.types.Action) -> None:
     data = obj.animation_data or obj.animation_data_create()
     assert data is not None
     before = data.action
+    (slot,) = action.slots
+    if before == action and data.action_slot == slot:
+        # Blender would work the frame out anew.
+        return
     data.action = action
-    (data.action_slot,) = action.slots
+    data.action_slot = slot
     if before is not None and before.library is None and before.users == 0:
         before.use_fake_user = True
 
@@ -541,6 +551,12 @@ class _Written:
         """The handles of those that have keys of their own."""
         self.keys = 0
         """How many there are."""
+        self.fingerprint = ""
+        """The action's, once that is known."""
+
+    def seen_in(self, action: bpy.types.Action) -> str:
+        """The fingerprint of an action that has these curves and no others."""
+        return deque(_fingerprint(action, self.digests), maxlen=1).pop()
 
     def filling(
         self,
@@ -642,17 +658,37 @@ class HalfWritten:
         self.name = action.name
         self.curves: dict[tuple[str, int], _Filled] = {}
         """Those that are filled, by data path and index."""
+        self._written: _Written | None = None
+        """All of them, once the action is what it will be."""
+        self._channels: Sequence[Channel] = ()
+        self._range = {name: getattr(action, name) for name in _RANGE}
         self._before: dict[tuple[str, int], dict[str, np.ndarray]] = {}
         self._fingerprint: str = action[MARK]["fingerprint"]
         action[MARK]["fingerprint"] = _BEING_WRITTEN
 
+    def all_of(self, channels: Sequence[Channel]) -> _Written | None:
+        """All curves, with the action's fingerprint, where nothing of these channels is left to be
+        filled.
+        """
+        own = self._channels
+        if len(own) != len(channels) or any(map(is_not, own, channels)):
+            return None
+        return self._written
+
     def filling(
-        self, frames: Floats, channels: Sequence[Channel], *, automatic: bool, seen: bool
+        self,
+        frames: Floats,
+        channels: Sequence[Channel],
+        *,
+        automatic: bool,
+        seen: bool,
+        repeats: bool,
     ) -> Iterator[None]:
         """Fill the curves that are there, in steps. What would be seen of it waits, unless the
         motion is nearly the same: then that may be.
         """
         self.curves.clear()
+        self._written, self._channels = None, list(channels)
         times = _checked(frames, channels)
         points, kinds = _dense_keys(times, automatic=automatic)
         for start in range(0, len(channels), CHANNELS_AT_ONCE):
@@ -674,12 +710,30 @@ class HalfWritten:
                     else:
                         points[:, 1] = channel.values[:, component]
                         found = _fill_dense(curve, points, kinds)
-                    told = _tell(curve, channel) if seen else None
-                    self.curves[place] = replace(
-                        found, had_own_handles=own, handles=told, told=seen
-                    )
-        if not seen:
-            yield from self._telling(channels)
+                    self.curves[place] = replace(found, had_own_handles=own)
+        yield from self._telling(channels)
+        yield from self._ending(times, channels, automatic=automatic, repeats=repeats)
+
+    def _ending(
+        self, times: np.ndarray, channels: Sequence[Channel], *, automatic: bool, repeats: bool
+    ) -> Iterator[None]:
+        """Do what is left where Blender has been told of all curves, in steps."""
+        count = sum(channel.values.shape[1] for channel in channels)
+        told = len(self.curves) == count and all(each.told for each in self.curves.values())
+        if not told or repeats != self._range["use_cyclic"]:
+            return
+        yield
+        if (action := bpy.data.actions.get(self.name)) is None:
+            return
+        channelbag, written = _dense_channelbag(action), _Written()
+        known = self.curves
+        deque(written.filling(channelbag, times, channels, known, automatic=automatic), maxlen=0)
+        _set_range(action, channelbag, times, repeats=repeats)
+        yield
+        if (action := bpy.data.actions.get(self.name)) is not None:
+            written.fingerprint = written.seen_in(action)
+            self._written = written
+        yield
 
     def _telling(self, channels: Sequence[Channel]) -> Iterator[None]:
         """Let Blender look at what is filled, in steps: at the first of them all is seen that was
@@ -714,6 +768,8 @@ class HalfWritten:
                 for name, values in keys.items():
                     curve.keyframe_points.foreach_set(name, values.ravel())
                 curve.update()
+        for name, value in self._range.items():
+            setattr(action, name, value)
         action[MARK]["fingerprint"] = self._fingerprint
 
     def _curves(self) -> dict[tuple[str, int], bpy.types.FCurve]:

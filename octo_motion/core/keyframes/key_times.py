@@ -9,7 +9,7 @@ are worked on at once.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Final
@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats, from_mode_values, normalized
+from ..steps import evenly
 from .channels import Booleans
 from .tracks import LOCATION, Integers, Limb
 
@@ -79,8 +80,6 @@ class Choice:
         self._rotations, self._locations = self._decoded(self._values)
         self._loose = self._kinks()
         self._loose[:, (0, -1)] = True
-        if every > 1:
-            self._let_go()
         self.keyed: Booleans = np.zeros(self._values.shape[:2], dtype=bool)
         """(limbs, frames)"""
         self.keyed[:, (0, -1)] = True
@@ -92,7 +91,10 @@ class Choice:
 
     def fewest(self) -> Iterator[float]:
         """Mark as few frames as will do; the share that is done."""
+        if self._every > 1:
+            yield from evenly(self._let_go(), 0.0)
         limbs, starts, ends = self._stretches()
+        done = 0.0
         whole = int((ends - starts).sum())
         self.keyed[limbs, starts] = True
         # Of each stretch: the last key, the furthest frame that it can span, the nearest that it
@@ -105,7 +107,7 @@ class Choice:
             probed = guess > good
             spans = _Spans(limbs[probed], every * at[probed], every * guess[probed])
             fits = np.ones(len(at), dtype=bool)
-            fits[probed] = self._fitted(spans) <= 1.0
+            fits[probed] = (yield from evenly(self._fitting(spans), done)) <= 1.0
             length = guess - at
             good = np.where(fits, np.maximum(guess, good), good)
             bad = np.where(fits, bad, guess)
@@ -124,7 +126,8 @@ class Choice:
             going = at < ends
             limbs, ends = limbs[going], ends[going]
             at, good, bad, guess = at[going], good[going], bad[going], guess[going]
-            yield 1.0 - int((ends - at).sum()) / whole
+            done = 1.0 - int((ends - at).sum()) / whole
+            yield done
 
     def _stretches(self) -> tuple[Integers, Integers, Integers]:
         """Limb, first and last frame of the stretches, cut where the motion bends most."""
@@ -159,7 +162,7 @@ class Choice:
             kinks[..., track] = size > _KINK * bound[:, None]
         return kinks
 
-    def _let_go(self) -> None:
+    def _let_go(self) -> Generator[None, None, None]:
         """Let the motion have a corner wherever it does not keep to its slope for a frame.
 
         From one key to the next there are moments in between then, and none to put a key at.
@@ -168,18 +171,21 @@ class Choice:
         starts = np.arange(0, count - 1, self._every)
         limbs, starts = np.repeat(np.arange(rows), len(starts)), np.tile(starts, rows)
         spans = _Spans(limbs, starts, starts + self._every)
-        off = self._fitted(spans) > 1.0
+        off = (yield from self._fitting(spans)) > 1.0
         self._loose[limbs[off], starts[off]] = True
         self._loose[limbs[off], starts[off] + self._every] = True
 
-    def _fitted(self, spans: _Spans) -> Floats:
-        """Give spans the handles that fit best; the errors that remain, as shares of the bounds."""
+    def _fitting(self, spans: _Spans) -> Generator[None, None, Floats]:
+        """Give spans the handles that fit best, in steps; the errors that remain, as shares of the
+        bounds.
+        """
         components = self._values.shape[2]
         spans.out, spans.into = np.empty((2, len(spans), components))
         errors = np.zeros(len(spans))
         for part in _blocks(spans.ends - spans.starts):
             self._fit(spans, part)
             errors[part] = self._errors(spans.part(part))
+            yield
         return errors
 
     def _fit(self, spans: _Spans, part: slice) -> None:

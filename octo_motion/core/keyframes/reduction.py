@@ -224,22 +224,22 @@ class _Plan:
 
 def _choose(times: Floats, plans: Sequence[_Plan], every: int) -> Generator[float, None, None]:
     """Fill in the key frames of all plans; columns that are alike are worked on together."""
-    alike: dict[object, list[tuple[int, int]]] = {}
-    for place, plan in enumerate(plans):
+    alike: dict[object, list[tuple[_Plan, int, list[int], Limb]]] = {}
+    for plan in plans:
         for number in range(len(plan.keyed)):
             tracks, limb = plan.column(number)
             form = tuple((track.kind, track.values.shape[1]) for track in limb.tracks)
-            alike.setdefault(form, []).append((place, number))
+            alike.setdefault(form, []).append((plan, number, tracks, limb))
+        yield 0.0
     done, whole = 0, max(sum(len(plan.keyed) for plan in plans), 1)
     for columns in alike.values():
-        found = [plans[place].column(number) for place, number in columns]
-        choice = Choice(times, [limb for _, limb in found], every)
+        choice = Choice(times, [limb for *_, limb in columns], every)
         for share in choice.fewest():
             yield (done + len(columns) * share) / whole
         done += len(columns)
-        for row, ((place, number), (tracks, _)) in enumerate(zip(columns, found, strict=True)):
-            plans[place].keyed[number] = choice.keyed[row]
-            plans[place].corners[tracks] = choice.corners[row].T
+        for row, (plan, number, tracks, _) in enumerate(columns):
+            plan.keyed[number] = choice.keyed[row]
+            plan.corners[tracks] = choice.corners[row].T
 
 
 def _alone(times: Floats, track: Track) -> BezierKeys:

@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 
 from ..rotations import Floats
+from ..steps import evenly
 from .channels import BezierKeys, Booleans, bezier_keys
 from .curves import Curves, Singles, inner_product
 from .residuals import LinearModel, Residuals
@@ -39,6 +40,8 @@ _MENDING: Final = 40
 """Rounds in which keys are added; then they get the values of the motion itself …"""
 _PINNING: Final = 40
 """… in so many more at most."""
+_TIDYING: Final = 0.95
+"""Share of the work that is done then."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +101,11 @@ class Search:
 
     def found(self) -> Generator[float, None, list[BezierKeys]]:
         """The keys of each track, in steps that yield the share that is done."""
-        self._fit(_FIRST, bounded=False)
+        yield from evenly(self._fit(_FIRST, bounded=False), 0.0)
         limit = _LIMIT
         for attempt in range(_MENDING + _PINNING):
-            yield 0.95 * (1.0 - 0.85**attempt)
+            done = _TIDYING * (1.0 - 0.85**attempt)
+            yield done
             if attempt == _JOINING:
                 self._join(_JOINED)
             if attempt >= _JOINING:
@@ -110,8 +114,11 @@ class Search:
                     break
                 self._mend(own, joint, limit, pin=attempt >= _MENDING)
                 limit = max(1.0 + _FALLS * (limit - 1.0), _KEPT) if limit > 1.03 else _KEPT
-            self._fit(_STEPS)
+                yield done
+            yield from evenly(self._fit(_STEPS), done)
+        yield _TIDYING
         self._tidy()
+        yield 1.0
         return self._as_keys()
 
     # --- Fitting ------------------------------------------------------------------------------
@@ -122,8 +129,9 @@ class Search:
             self._times, keyed, self._smooth, self._pinned, loops=self._loops, held=self.held
         )
 
-    def _fit(self, steps: int, *, bounded: bool = True) -> None:
-        change = fitted(self._curves, self._model, self._away(), steps, bounded=bounded)
+    def _fit(self, steps: int, *, bounded: bool = True) -> Generator[None, None, None]:
+        off = self._away()
+        change = yield from fitting(self._curves, self._model, off, steps, bounded=bounded)
         self._chosen = self._chosen + change
 
     def _away(self) -> Singles:
@@ -292,9 +300,9 @@ _RIDGE: Final = 1e-3
 """Share by which they are held for themselves: some hardly matter to any frame."""
 
 
-def fitted(
+def fitting(
     curves: Curves, model: LinearModel, off: Singles, steps: int, *, bounded: bool
-) -> Singles:
+) -> Generator[None, None, Singles]:
     """By how much to change choices (4, size) to make errors smaller, in so many steps of conjugate
     gradients.
 
@@ -318,13 +326,16 @@ def fitted(
         weighted = [weight * each for weight, each in zip(weights, errors, strict=True)]
         return curves.gathered(model.pull(change, weighted, weights[0]))
 
+    yield
     eased = _eased(curves, model.weights(stiff[0]))
+    yield
     rest = -gradient(off, errors, pulls)
     turned = eased(rest)
     way = turned.copy()
     total = np.zeros_like(rest)
     size = inner_product(rest, turned)
     for _ in range(steps):
+        yield
         if size <= 1e-12:
             break
         change = curves.spread(way)

@@ -79,6 +79,7 @@ def parts(fine: Fine, keyed: Booleans, corners: Booleans, *, loops: bool = False
 def searching(part: Part) -> Generator[float, None, Found]:
     """The keys of one stretch, in steps that yield the share that is done."""
     search = Search(part.fine, part.keyed, part.corners, loops=part.loops, ends=part.ends)
+    yield 0.0
     keys = yield from search.found()
     return keys, search.held
 

@@ -655,6 +655,47 @@ def test_an_action_that_is_half_written_is_given_back_where_the_next_one_cannot_
     assert not actions.is_edited(action_of(slowly))
 
 
+def all_but_written(armature: Any) -> Any:
+    """Go on until all keys of an action are there that is about to be marked; that action."""
+    armature.update_tag(refresh={"OBJECT"})
+    bpy.context.view_layer.update()
+    live.run_pending()
+    name, work = as_written(armature)
+    action = action_of(armature)
+    while (half := work.motion.shown.half) is None or half.all_of(half._channels) is None:
+        live._state.go_on(name, 0.0)
+        assert live._state.following[name] is work
+    return action
+
+
+def test_a_frame_range_that_came_with_half_written_keys_is_given_back(slowly: Any) -> None:
+    settings, before, keys = settings_of(slowly), frame_range(slowly), motion(slowly)
+    settings.frame_start, settings.frame_end = 11, settings.frame_end + 10
+    action = all_but_written(slowly)
+    assert frame_range(slowly) != before
+    settings.live = False
+    live.finish_following()
+    assert action_of(slowly) == action
+    assert frame_range(slowly) == before
+    assert motion(slowly) == keys
+    assert not actions.is_edited(action)
+
+
+def frame_range(armature: Any) -> tuple[float, float]:
+    return tuple(action_of(armature).frame_range)
+
+
+def test_a_curve_muted_on_the_last_step_stays_so_and_the_action_is_the_artists(slowly: Any) -> None:
+    drag_route(slowly)
+    action = all_but_written(slowly)
+    list(actions.curves_of(action))[7].mute = True
+    live.finish_following()
+    settle()
+    assert action_of(slowly) == action
+    assert list(actions.curves_of(action))[7].mute
+    assert actions.is_edited(action)
+
+
 def few_on_their_way(armature: Any) -> dict[Any, Any]:
     """Go on until a motion with a key on every frame is about to get few; its keys."""
     settings_of(armature).keys = "REDUCED"

@@ -555,13 +555,13 @@ def raising_between_frames(
     course: ArmsOverGround,
     poses: Poses,
     joints: Sequence[Floats],
-    again: Callable[[np.ndarray, Floats], tuple[Poses, Sequence[Floats]]],
+    again: Callable[[np.ndarray, Floats], Generator[None, None, tuple[Poses, Sequence[Floats]]]],
 ) -> Generator[None, None, Poses]:
     """The same motion, without arms that dip into the ground between frames; in steps.
 
     Poses of all frames are left as they are; joints of each arm are (frames, joints, 3). ``again``
-    makes poses of some frames (n,), with arms (n, arms) so many arm lengths higher, and the joints
-    of each arm; of arms that are nowhere higher it need say nothing.
+    makes poses of some frames (n,), in steps, with arms (n, arms) so many arm lengths higher, and
+    the joints of each arm; of arms that are nowhere higher it need say nothing.
     """
     if len(poses.rotations) < 2:
         return poses
@@ -582,7 +582,7 @@ def raising_between_frames(
         if not len(chosen):
             break
         lift = np.minimum(lift + more, _MOST)
-        fresh, places = again(chosen, lift[chosen])
+        fresh, places = yield from again(chosen, lift[chosen])
         yield
         arms = np.flatnonzero(np.any(lift[chosen] > 0.0, axis=0)).tolist()
         rotations, strains, deep = last.rotations.copy(), last.strains.copy(), deep.copy()

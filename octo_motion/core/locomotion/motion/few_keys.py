@@ -19,13 +19,13 @@ from ...keyframes import (
     Residuals,
     Track,
     chain_to_tip,
-    reduce_keys,
     reducing,
     rotation_property,
     values_at,
 )
 from ...rotations import Floats, from_mode_values
 from ...skeleton import Skeleton
+from ...steps import evenly
 from ..gait import Arm
 from ..metrics import Measured
 from ..rig import Poses, carried_by_root_bone, halfway_linear
@@ -83,7 +83,8 @@ def reduced(
     carried: float | Floats = 0.0
     if motion.travel:
         travel, unit = _travel(creature, motion, tolerances)
-        found += reduce_keys(frames, [travel], every=every, all_of_them=dense, loops=loops)
+        keys = reducing(frames, [travel], every=every, all_of_them=dense, loops=loops)
+        found += yield from evenly(keys, 0.0)
         parts.append(motion.travel)
         # What it does not take is left to the arms, frame by frame.
         played = [values_at(keys, frames) for keys in found[0]]

@@ -575,9 +575,11 @@ def _clearing(
         radii = [creature.scale * each for each in plan.standing[0].radii]
         return replace(poses, rotations=keep_off_ground(course, poses, radii, share))
 
-    def again(chosen: np.ndarray, lift: Floats) -> tuple[Poses, Sequence[Floats]]:
+    def again(
+        chosen: np.ndarray, lift: Floats
+    ) -> Generator[None, None, tuple[Poses, Sequence[Floats]]]:
         """Some frames anew, with arms raised; others are left as they are."""
-        higher, joints = made.higher(chosen, lift)
+        higher, joints = yield from made.higher(chosen, lift)
         arms.late[chosen] = higher.late
         poses = Poses(higher.rotations, higher.strains, going[0][chosen], going[1][chosen])
         poses = kept_off(poses, None if loose is None else loose[chosen])

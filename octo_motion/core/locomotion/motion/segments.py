@@ -612,7 +612,8 @@ class Segments:
                 done = 0.9 * (segment + start / max(len(part), 1)) / self.count
                 for _ in motion.posing(segment, part, chosen, smoothing, cyclic=cyclic):
                     yield done
-            motion.calm(segment, np.arange(len(travel.distance)), made.arms)
+            for _ in motion.calming(segment, np.arange(len(travel.distance)), made.arms):
+                yield 0.9 * (segment + 1) / self.count
         return motion
 
 
@@ -692,11 +693,11 @@ class SegmentedMotion:
             return self.travel.at(chosen)
         return self.plan.travel_of(number, self.travel.distance[chosen])
 
-    def calm(
+    def calming(
         self, segment: int, moments: np.ndarray, arms: ArmMotion, lift: Floats | None = None
-    ) -> None:
+    ) -> Generator[None, None, None]:
         """Let arms that are about to go over, or have just done so, come to rest in their gait, in
-        place.
+        place and in steps.
 
         The body turns meanwhile as no walking body does: what an arm on the ground would make of
         that is wild. So an arm goes over from the pose in which it let go. With a lift (n, arms) in
@@ -720,7 +721,7 @@ class SegmentedMotion:
                     raised.lift[part, arm] = higher[part]
             travel = plan.travel_of(number, here)
             places = plan.transitions.course.at(here)
-            stood = walk.pose(travel.phase, travel.turn, *places, raised)
+            stood = yield from walk.posing(travel.phase, travel.turn, *places, raised)
             for arm, chosen, again, part in asked:
                 bones = plan.bones_of[arm]
                 arms.rotations[chosen, bones] = stood.rotations[part, bones][again]
@@ -762,35 +763,41 @@ class SegmentedMotion:
         here, higher = np.concatenate(stops).T
         return asked, here, higher
 
-    def higher(self, chosen: np.ndarray, lift: Floats) -> tuple[ArmMotion, list[Floats] | None]:
-        """Some moments (n,) anew, with arms that are a lift (n, arms) of arm lengths higher than
-        they have to be.
+    def higher(
+        self, chosen: np.ndarray, lift: Floats
+    ) -> Generator[None, None, tuple[ArmMotion, list[Floats] | None]]:
+        """Some moments (n,) anew, in steps, with arms that are a lift (n, arms) of arm lengths
+        higher than they have to be.
 
         Of the arms there, those that are not raised count for nothing where the gait never changes.
         With them come joints of the raised ones by arm, where they are known.
         """
         if self.plan.transitions is None:
-            return self._higher_on_one(chosen, lift)
-        again = [self._again(number, chosen, lift) for number in range(len(self.segments))]
+            return (yield from self._higher_on_one(chosen, lift))
+        again = [each.arms for each in self.segments]
+        for number in range(len(again)):
+            again[number] = yield from self._again(number, chosen, lift)
         # All moments, so that bones turn the same way round from one to the next as they did.
         arms = self._joined(again)
         return arms.at(chosen), None
 
     def _higher_on_one(
         self, chosen: np.ndarray, lift: Floats
-    ) -> tuple[ArmMotion, list[Floats] | None]:
+    ) -> Generator[None, None, tuple[ArmMotion, list[Floats] | None]]:
         (made,), (walk,) = self.segments, self.plan.walks
         assert walk is not None
         evened = tuple(each[:, :, chosen] for each in made.evened)
         raised = Raise(lift, made.shapes_at(chosen), evened)
         travel, places = self.travel.at(chosen), (self.places[0][chosen], self.places[1][chosen])
-        stood = walk.pose(travel.phase, travel.turn, *places, raised)
+        stood = yield from walk.posing(travel.phase, travel.turn, *places, raised)
         arms = made.arms.at(chosen)
         arms.rotations, arms.strains = stood.rotations, stood.strains
         arms.late[:, raised.arms] = stood.misses[:, raised.arms]
         return arms, walk.by_arm(stood.joints, raised)
 
-    def _again(self, segment: int, chosen: np.ndarray, lift: Floats) -> ArmMotion:
+    def _again(
+        self, segment: int, chosen: np.ndarray, lift: Floats
+    ) -> Generator[None, None, ArmMotion]:
         """The arms on one segment, higher at some moments."""
         plan, distance, before = self.plan, self.travel.distance, self.segments[segment]
         number = plan.gait_of(segment)
@@ -801,14 +808,14 @@ class SegmentedMotion:
         raised = Raise(lift[inside], evened=tuple(each[:, :, moments] for each in before.evened))
         travel = plan.travel_of(number, distance[moments])
         places = self.places[0][moments], self.places[1][moments]
-        stood = walk.pose(travel.phase, travel.turn, *places, raised)
+        stood = yield from walk.posing(travel.phase, travel.turn, *places, raised)
         for arm in raised.arms:
             bones, higher = plan.bones_of[arm], raised.lift[:, arm] > 0.0
             own = moments[higher]
             arms.rotations[own, bones] = stood.rotations[higher, bones]
             arms.strains[own, bones] = stood.strains[higher, bones]
             arms.late[own, arm] = stood.misses[higher, arm]
-        self.calm(segment, chosen, arms, lift)
+        yield from self.calming(segment, chosen, arms, lift)
         return arms
 
     def _joined(self, segments: Sequence[ArmMotion]) -> ArmMotion:

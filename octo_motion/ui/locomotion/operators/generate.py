@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from itertools import count
 from typing import Any, Final
@@ -249,7 +250,11 @@ class _LiveMotions(Live):
 
     def work_on(self, armature: bpy.types.Object, work: _Work, seconds: float) -> None:
         settings = locomotion_settings(armature)
-        there, motion = work.job.work(seconds), work.motion
+        motion = work.motion
+        # What keys on their way to the action change is no change to follow; Blender works the
+        # frame out anew with them, which takes longer than the keys.
+        with self.deaf() if work.known else nullcontext():
+            there = work.job.work(0.5 * seconds if work.known else seconds)
         if motion.has_news:
             with self.deaf():
                 motion.tell(armature)
@@ -464,13 +469,15 @@ def _is_written(
 
 def _write(armature: bpy.types.Object, motion: Following) -> None:
     """Write a motion that was worked out; where Generate makes other keys of it, these follow."""
-    if motion.shot.rig.detection is not None:
+    found = motion.shot.rig.detection is not None
+    if found:
         # What was found is what is set from now on.
         _state.known.pop(armature.name, None)
     motion.write()
     _note_sketch(armature, motion)
-    # Markers of contacts are where the motion has them now.
-    _state.seen[armature.name] = _state.made_from(armature)
+    if found or locomotion_settings(armature).ground.shown:
+        # Markers of contacts are where the motion has them now.
+        _state.seen[armature.name] = _state.made_from(armature)
     if motion.exact:
         del _state.following[armature.name]
     else:

@@ -241,7 +241,13 @@ class Following:
         half = self.shown.half = self.shown.half or HalfWritten(previous)
         # Few keys are as good as those on all frames, which are there by now.
         seen = self._written
-        for _ in half.filling(made.frames, made.channels, automatic=made.automatic, seen=seen):
+        for _ in half.filling(
+            made.frames,
+            made.channels,
+            automatic=made.automatic,
+            seen=seen,
+            repeats=self.shot.job.repeats,
+        ):
             yield 1.0
 
     def write(self) -> None:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Between two frames no arm dips into the ground, as far as poses at these frames can help it."""
 
+from collections.abc import Generator
+
 import numpy as np
 import pytest
 
@@ -40,8 +42,11 @@ class Shot:
     def higher(self, chosen: np.ndarray, lift: Floats) -> Raise:
         return Raise(lift, tuple(each[:, :, chosen] for each in self.shapes))
 
-    def again(self, chosen: np.ndarray, lift: Floats) -> tuple[Poses, list[Floats]]:
+    def again(
+        self, chosen: np.ndarray, lift: Floats
+    ) -> Generator[None, None, tuple[Poses, list[Floats]]]:
         self.asked.append(chosen)
+        yield
         return self.pose(chosen, lift)
 
     def whole(self) -> tuple[Poses, list[Floats]]:
@@ -68,8 +73,10 @@ def test_an_arm_that_would_jerk_when_raised_is_left_as_it_was() -> None:
     shot = Shot(walker(GROUNDS["bumps"], stretch=True), 16)
     poses, joints = shot.whole()
 
-    def jerky(chosen: np.ndarray, lift: Floats) -> tuple[Poses, list[Floats]]:
-        raised, places = shot.again(chosen, lift)
+    def jerky(
+        chosen: np.ndarray, lift: Floats
+    ) -> Generator[None, None, tuple[Poses, list[Floats]]]:
+        raised, places = yield from shot.again(chosen, lift)
         aside = from_axis_angle(np.array([1.0, 0.0, 0.0]), 0.7 * (chosen % 2))
         turned = multiply(raised.rotations, aside[:, None])
         return Poses(turned, raised.strains, raised.locations, raised.orientations), places
