@@ -12,6 +12,7 @@ import pytest
 from tests.core import objects
 from tests.referee.creature_measures import angles_between, arm_length, pop, skin_through_skin
 from tests.referee.recording import Recording, moments, record, show
+from tests.referee.scenes import GROUNDS, build
 from tests.ui.rig import Octopus, click, generate
 
 pytestmark = pytest.mark.one_blender
@@ -112,7 +113,9 @@ def test_an_arm_brings_what_it_holds_to_the_mouth_and_those_beside_it_close(octo
     # The body goes up and down, and what it holds goes along.
     moved = np.mean([played.heads[214, each[0]] for each in chains], axis=0) - roots
     there = np.array(thing.matrix_world.translation)
-    np.testing.assert_allclose(there, prey + moved, atol=1e-4)
+    np.testing.assert_allclose(there[:2], (prey + moved)[:2], atol=1e-4)
+    # Where that leaves no room for the arm below it, it keeps off the ground: measured, 3 mm.
+    assert -1e-4 < there[2] - (prey + moved)[2] < 0.006
 
 
 def test_the_way_of_an_arm_that_reaches_is_the_same_at_any_frame_rate(octopus: Any) -> None:
@@ -126,3 +129,70 @@ def test_the_way_of_an_arm_that_reaches_is_the_same_at_any_frame_rate(octopus: A
         largest.append(float(angles_between(turns[1:], turns[:-1]).max()))
     # 1 is smooth, 2 a jump that no frame rate makes smaller; measured: 1.04.
     assert pop(largest) < 1.2, largest
+
+
+def unit_of(armature: Any) -> float:
+    """Length of the longest arm at rest."""
+    bones, arms = armature.data.bones, armature.octo_motion.locomotion.arms
+    return max(sum(bones[each.name].length for each in arm.bones) for arm in arms)
+
+
+def beside_the_way(settings: Any, off: float, size: float) -> Any:
+    """A ball beside the middle of the route, on the ground, with a place and a radius in arm
+    lengths.
+    """
+    armature, (first, last) = settings.id_data, settings.route.data.splines[0].bezier_points
+    points = [first.co, first.handle_right, last.handle_left, last.co]
+    a, b, c, d = (np.array(settings.route.matrix_world @ each) for each in points)
+    middle, along = 0.125 * (a + 3.0 * b + 3.0 * c + d), 0.75 * (d + c - b - a)
+    aside = np.cross([0.0, 0.0, 1.0], along / np.linalg.norm(along))
+    unit = unit_of(armature)
+    place = middle + off * unit * aside
+    _, height, *_ = settings.ground.object.ray_cast((*place[:2], 10.0), (0.0, 0.0, -1.0))
+    place[2] = height[2] + size * unit
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=size * unit, location=place)
+    thing: Any = bpy.context.object
+    bpy.context.view_layer.objects.active = armature
+    return thing
+
+
+@pytest.mark.parametrize(
+    ("setup", "ground", "mode", "off"),
+    [
+        ("walk", "plane", "COIL", 0.3),
+        ("crawl", "bumps", "TOUCH", -0.5),
+        ("crawl", "slope", "COIL", 0.5),
+        ("walk", "stairs", "MOUTH", 0.6),
+    ],
+)
+def test_an_arm_that_reaches_from_a_walk_snaps_nowhere_and_stays_over_the_ground(
+    setup: str, ground: str, mode: str, off: float
+) -> None:
+    things: list[Any] = []
+
+    def change(settings: Any) -> None:
+        things.append(beside_the_way(settings, off, 0.08))
+        click("generate_locomotion")
+        start, end = settings.result.frame_range
+        bpy.context.scene.frame_set(round(0.5 * (start + end)))
+        click("reach_add", target=things[0].name, mode=mode)
+
+    scene = build(setup, ground, change=change)
+    settings = scene.armature.octo_motion.locomotion
+    (reach,) = settings.reaches
+    last = min(reach.frame_release + reach.back_frames, scene.end)
+    played = record(scene.armature, moments(reach.frame_start, last), with_skin=False)
+    length, thing = unit_of(scene.armature), things[0]
+    show(bpy.context.scene, reach.frame_contact + reach.coil_frames)
+    place = np.array(thing.matrix_world.translation)
+    at = reach.frame_contact + reach.coil_frames - reach.frame_start
+    near = [
+        np.linalg.norm(played.heads[at, played.chain(arm)] - place, axis=1).min()
+        for arm in scene.arms
+    ]
+    chain = played.chain(scene.arms[int(np.argmin(near))])
+    turns = angles_between(played.turns[1:, chain], played.turns[:-1, chain])
+    heights = GROUNDS[ground](*np.moveaxis(played.tails[:, chain, :2] / length, -1, 0)) * length
+    sunk = float((heights - played.tails[:, chain, 2]).max()) / length
+    assert turns.max() <= 30.0
+    assert sunk <= 0.005

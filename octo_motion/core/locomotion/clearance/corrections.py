@@ -137,6 +137,7 @@ def lead_past(
     strains: Floats,
     *,
     share: Floats,
+    above: Floats,
     held: Sequence[np.ndarray],
     travel: tuple[Floats, Floats],
     ground: Ground | None,
@@ -149,7 +150,8 @@ def lead_past(
         volume: the arms and the body.
         rotations: (frames, bones, 4) of all arms, one after the other.
         strains: (frames, bones) by how much bones are longer than at rest, as a share.
-        share: (frames, arms) how far arms may be led another way, 0…1.
+        share: (frames, arms) how far arms may be led past the others and the body, 0…1.
+        above: (frames, arms) how far they may be led over the ground, 0…1.
         held: for each arm (frames, joints) how far joints are to stay where they are, 0…1.
         travel: locations (frames, 3) and orientations (frames, 4) of the armature, world.
         ground: what is below them, if anything.
@@ -162,7 +164,7 @@ def lead_past(
         _Crowded.making(volume, rotations, strains, in_contact=lying, busy=nobody, travel=travel)
     )
     holds = np.stack([each.max(axis=1) for each in held], axis=1)
-    passing = Passing(share, holds, crowd.crowd.in_contact.argmax(axis=2))
+    passing = Passing(share, above, holds, crowd.crowd.in_contact.argmax(axis=2))
     moved = led_past(
         crowd.crowd,
         volume.body,

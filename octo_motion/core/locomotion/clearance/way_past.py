@@ -48,7 +48,9 @@ class Passing:
     """Which arms reach."""
 
     share: Floats
-    """(frames, arms) how far they may be led another way, 0…1."""
+    """(frames, arms) how far they may be led another way, past the others and the body, 0…1, …"""
+    above: Floats
+    """… and how far over the ground."""
     holds: Floats
     """(frames, arms) how far they hold something, 0…1."""
     anchors: np.ndarray
@@ -67,7 +69,7 @@ def led_past(
 
     Parts of the body have one frame, or one for each of the arms'.
     """
-    items = np.nonzero(passing.share > 0.0)
+    items = np.nonzero((passing.share > 0.0) | (passing.above > 0.0))
     if not len(items[0]):
         return None
     touching = Touching(crowd, body)
@@ -77,15 +79,18 @@ def led_past(
     joints, moved = crowd.joints.copy(), False
     for _ in range(_ROUNDS):
         wanted, weights = _wanted(crowd, touching.at(joints), passing)
+        wanted *= passing.share[..., None, None]
         if floor is not None:
             goals, matters = wanted[items], weights[items]
             height = floor.clearance(items[0], joints[items])
-            _off_ground(crowd.radii[items[1]], height, goals, matters, crowd.up[items[0]])
+            lacking = (
+                np.maximum(crowd.radii[items[1]] - height, 0.0) * passing.above[items][:, None]
+            )
+            _rise(crowd.radii[items[1]], lacking, goals, matters, crowd.up[items[0]])
             wanted[items], weights[items] = goals, matters
         if not np.any(wanted):
             break
         moved = True
-        wanted *= passing.share[..., None, None]
         goals, matters = (_GAIN * blurred(each, width)[items] for each in (wanted, weights))
         joints[items] = rod.bent(goals[:, 1:], np.minimum(matters[:, 1:], 1.0))
     return joints if moved else None
@@ -215,8 +220,7 @@ def _over(touches: Touches, sign: Floats | float, outward: Floats) -> Floats:
     return wide * deep * way / np.maximum(size, _TINY)
 
 
-def _off_ground(radii: Floats, height: Floats, goals: Floats, weights: Floats, up: Floats) -> None:
-    """Ask joints (items, joints) at a height that are too low to rise (items, 3), in place."""
-    lacking = np.maximum(radii - height, 0.0)
+def _rise(radii: Floats, lacking: Floats, goals: Floats, weights: Floats, up: Floats) -> None:
+    """Ask joints (items, joints) to rise (items, 3) by what is lacking, in place."""
     goals += lacking[..., None] * up[:, None]
     weights += lacking / (lacking + _SOFT * radii)

@@ -40,6 +40,7 @@ from ..rig import (
     halfway_automatic,
     object_transforms,
     root_bone_transforms,
+    turn_limits,
     turns_in_world,
     where_it_helps,
 )
@@ -127,6 +128,8 @@ _BONES_IN_BRIEF: Final = 3_500
 """… and where Blender goes on meanwhile; the numbers are the same."""
 _EASINGS: Final = 4
 """How often bones that turn too fast are given more time, and kept off the ground again."""
+_FIRMLY: Final = 0.5
+"""How far an arm holds something from which on it stays as it is, as one that stands."""
 _FLOOR_AROUND: Final = 2.5
 """Arm lengths to all sides of the body in which the floor is looked at …"""
 _FLOOR_FINE: Final = 0.02
@@ -631,7 +634,9 @@ def _reach(
     if reaching is None:
         return None
     before = arms.rotations.copy()
-    travelling = Travelling(*keyed, creature.scale)
+    ground = _ground(plan) if plan.carry is None else None
+    heights = ground.height if ground is not None else None
+    travelling = Travelling(*keyed, creature.scale, heights)
     reached = reaching.apply(plan.schedule.frames, arms.rotations, travelling, arms.strains)
     _led_past(plan, arms, reached, volume, going)
     moved = np.any(arms.rotations != before, axis=-1)
@@ -659,6 +664,7 @@ def _led_past(
             arms.rotations,
             arms.strains,
             share=reached.led,
+            above=reached.away,
             held=reached.held,
             travel=going,
             ground=ground,
@@ -724,13 +730,17 @@ def _take_time(
     """
     job, every = plan.job, plan.stride
     creature = job.creature
-    busy = reached.away > 0.0 if reached is not None else np.zeros(arms.late.shape, dtype=bool)
+    holding, reaching = np.zeros(arms.late.shape, dtype=bool), None
+    if reached is not None:
+        holding = np.stack([each.max(axis=1) > _FIRMLY for each in reached.held], axis=1)
+        reaching = reached.away > 0.0
     held = [
         (lying.any(axis=1) & (late <= MISS)) | own
-        for lying, late, own in zip(arms.in_contact, arms.late.T, busy.T, strict=True)
+        for lying, late, own in zip(arms.in_contact, arms.late.T, holding.T, strict=True)
     ]
     frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
-    before, rate, per_cycle = arms.rotations, job.timing.rate, plan.pace.fastest
+    before, rate = arms.rotations, job.timing.rate
+    limits = turn_limits(rate, plan.pace.fastest, reaching, every)
     turning = turns_in_world(frames, before, going[1], every)
     if not any(gait.poser.settings.smoothing_cycles for gait in plan.segments.gaits):
         return turning
@@ -738,7 +748,7 @@ def _take_time(
         eased = eased_turns(
             *(frames, arms.rotations, going[1], held),
             rate=rate,
-            per_cycle=per_cycle,
+            limits=limits,
             every=every,
             cyclic=cyclic,
             turning=turning if number == 0 else None,
@@ -758,9 +768,8 @@ def _take_time(
     if arms.rotations is before:
         return turning
     # Where it is no help, it is no good either.
-    most = fastest_turn(rate, per_cycle)
     arms.rotations = where_it_helps(
-        *(frames, before, arms.rotations, going[1]), most=most, every=every, cyclic=cyclic
+        *(frames, before, arms.rotations, going[1]), limits=limits, every=every, cyclic=cyclic
     )
     return None
 

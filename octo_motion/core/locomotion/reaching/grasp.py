@@ -29,6 +29,7 @@ from ...rotations import (
     normalized,
     rotate,
     shortest_arc,
+    slerp,
 )
 from ...smoothing import least_jerk, smooth_step
 from ..gait import Arm, close_group
@@ -39,10 +40,12 @@ from .timeline import (
     Timeline,
     curled,
     embracing,
+    even_bell,
     first_place,
     folded,
     front_width,
     passed,
+    unhurried,
 )
 from .winding import Coil, Profile, Skins, Winding, WindingStart, wind
 
@@ -82,11 +85,19 @@ _FARTHEST: Final = 0.4
 """Bone lengths that a joint gives way in one go."""
 _CLOSING: Final = 20
 """Steps of Newton's method: an arm that is close to what it holds is folded up a lot."""
+_PACINGS: Final = 3
+"""How often time is given anew to what it does."""
 _X: Final = np.array([1.0, 0.0, 0.0])
 _Y: Final = np.array([0.0, 1.0, 0.0])
 _UP: Final = np.array([0.0, 0.0, 1.0])
 _TURNED_OVER: Final = np.radians(160.0)
 """By how much what is brought to the mouth turns over."""
+_OUTLINED: Final = 5
+"""Every so many points of an object's outline are held over the ground …"""
+_ROUNDED: Final = 0.5
+"""… and begin to rise so many skins before they would be in it …"""
+_SOON: Final = 0.25
+"""… but wholly only after this share of the way."""
 _BESIDE: Final = 2
 """How many arms close over what is at the mouth, beside the one that has brought it."""
 
@@ -103,6 +114,14 @@ class Places:
     def __getitem__(self, chosen: slice | np.ndarray) -> Places:
         """Some of the frames."""
         return Places(self.positions[chosen], self.rotations[chosen])
+
+    def at(self, before: np.ndarray, after: np.ndarray, share: Floats) -> Places:
+        """Places (moments,) between those of two frames each."""
+        first, second = self.positions[before], self.positions[after]
+        return Places(
+            first + share[:, None] * (second - first),
+            slerp(self.rotations[before], self.rotations[after], share),
+        )
 
     def seen(self, points: Floats) -> Floats:
         """Points (…, 3) of the object's frame in armature space, (frames, …, 3)."""
@@ -292,17 +311,35 @@ class Grasp:
         weight = progress.weight(arm.along)
         return arm.shaped(lerp_rotation_vectors(usual, arm.shape(cleared), weight))
 
-    def paced(self, touched: Places, released: Places) -> Grasp:
-        """The same, hurried nowhere: places are those (one) of the touch and of the release."""
-        arm = self.arm
+    def paced(self, times: Floats, places: Places, otherwise: Floats | None = None) -> Grasp:
+        """The same, hurried nowhere, of an object at these places at times (frames,) and of what
+        the arm does otherwise, rotations (frames, bones, 4); at rest if that is not said.
+        """
+        arm, grasp = self.arm, self
+        usual = np.tile(arm.shape(arm.at_rest), (len(times), 1, 1))
+        if otherwise is not None:
+            usual = arm.shape(arm.from_bones(otherwise))
 
-        def frames(progress: Progress) -> Floats:
-            count = len(progress.out)
-            usual = np.tile(arm.shape(arm.at_rest), (count, 1, 1))
-            place = released if np.any(progress.back > 0.0) else touched
-            return self._reaching(progress, place[np.zeros(count, dtype=np.intp)], usual)
+        def frames(progress: Progress, moments: Floats) -> Floats:
+            before, share = _between(times, moments)
+            after = np.minimum(before + 1, len(times) - 1)
+            there = slerp(usual[before], usual[after], share[:, None])
+            return self._reaching(progress, places.at(before, after, share), there)
 
-        return replace(self, pace=Pace.of(frames))
+        # Where object and arm are hangs on the pace, and it on where they are.
+        for _ in range(_PACINGS):
+            passing = self.timeline.passing(grasp.pace)
+            grasp = replace(self, pace=Pace.of(frames, passing))
+        return grasp
+
+
+def _between(times: Floats, moments: Floats) -> tuple[np.ndarray, Floats]:
+    """Which of the times (frames,), ascending, comes before each moment (moments,), and the share
+    of the way to the next.
+    """
+    place = np.interp(moments, times, np.arange(len(times)))
+    before = np.minimum(place.astype(np.intp), max(len(times) - 2, 0))
+    return before, place - before
 
 
 def plan_grasp(
@@ -364,7 +401,7 @@ def plan_grasp(
     if not plans:
         raise _too_far(arm, target, times[held], holding, name)
     best = min(plans, key=itemgetter(0))[1]
-    return best.paced(holding[:1], holding[-1:])
+    return best.paced(times, places)
 
 
 def _coil(arm: ArmFrames, skins: Skins, places: Places, winding: Winding) -> Coil | None:
@@ -501,6 +538,16 @@ class Travelling:
     orientations: Floats
     """(frames, 4) world."""
     scale: float
+    ground: Callable[[Floats], Floats] | None = None
+    """Heights (…) of what is below places (…, 2), world; none where there is nothing."""
+
+    def sunk(self, points: Floats) -> Floats:
+        """How deep (frames,) the lowest of points (frames, points, 3), world, is in the ground; not
+        above zero where none is.
+        """
+        if self.ground is None:
+            return np.zeros(len(points))
+        return (self.ground(points[..., :2]) - points[..., 2]).max(axis=1)
 
     def seen(self, positions: Floats, rotations: Floats) -> Places:
         """Places in the world (frames, 3), (frames, 4) from the armature, in its units."""
@@ -744,12 +791,7 @@ class _Work:
     def move(self, reach: Reach, number: int) -> None:
         """Let an arm reach."""
         reaching, times = self.reaching, self.times
-        seen, arm = self.seen(reach), reaching.frames[number]
-        shift, turn = reaching.standings[number]
-        places = Places(
-            rotate(conjugate(turn), seen.positions - shift),
-            multiply(conjugate(turn), seen.rotations),
-        )
+        places, arm = self._as_at_rest(number, self.seen(reach)), reaching.frames[number]
         columns = self._columns(number)
         own, progress = self.rotations[:, columns], reach.timeline.progress(times)
         if reach.profile is None:
@@ -757,7 +799,7 @@ class _Work:
         else:
             profile = reach.profile.scaled(1.0 / self.travelling.scale)
             target = Target(profile, places, f"'{reach.target}'")
-            grasp = reaching.grasp(reach, number, target, times)
+            grasp = reaching.grasp(reach, number, target, times).paced(times, places, own)
             moved, progress = grasp.apply(times, places, own), grasp.progress(times)
             self.held[number][:, grasp.coil.first :] += progress.holds[:, None]
             if reach.mode != "TOUCH":
@@ -827,18 +869,70 @@ class _Work:
             seen = travelling.seen(reach.positions, reach.rotations)
             start, own = seen.positions[held[0]], seen.rotations[held[0]]
             places, turned = np.tile(start, (len(held), 1)), np.tile(own, (len(held), 1))
-            if reach.brought is not None and reach.profile is not None:
-                took = max(reach.brought - reach.timeline.closed, 1e-6)
-                share = least_jerk((times[held] - reach.timeline.closed) / took)
-                profile = reach.profile.scaled(1.0 / travelling.scale)
+            line = reach.timeline
+            took = line.end - line.release if reach.brought is None else reach.brought - line.closed
+            share = (times[held] - line.closed) / max(took, 1e-6)
+            if reach.brought is None or reach.profile is None:
+                share = even_bell(share)
+            else:
                 number = self.reaching.arm_of(reach, times, seen)
-                places, turned = self.reaching.drawn_in(profile, start, own, share, number)
+                share, (places, turned) = self._drawn_in(reach, number, start, own, share)
             positions, rotations = reach.positions.copy(), reach.rotations.copy()
             turn = travelling.orientations[held]
             positions[held] = travelling.locations[held] + travelling.scale * rotate(turn, places)
             rotations[held] = multiply(turn, turned)
+            positions[held] += self._risen(reach, share, positions[held], rotations[held])
             positions[held[-1] :], rotations[held[-1] :] = positions[held[-1]], rotations[held[-1]]
             self.ways[reach.target] = replace(reach, positions=positions, rotations=rotations)
+
+    def _drawn_in(
+        self, reach: Reach, number: int, start: Floats, own: Floats, time: Floats
+    ) -> tuple[Floats, tuple[Floats, Floats]]:
+        """Shares (moments,) of the way from a position (3,) and rotation (4,) to the mouth, by
+        shares of its time, such that the arm is hurried nowhere; and where the object is then.
+        """
+        assert reach.profile is not None
+        profile = reach.profile.scaled(1.0 / self.travelling.scale)
+        arm = self.reaching.frames[number]
+
+        def drawn(share: Floats) -> tuple[Floats, Floats]:
+            return self.reaching.drawn_in(profile, start, own, share, number)
+
+        def places(share: Floats) -> Places:
+            return self._as_at_rest(number, Places(*drawn(share)))
+
+        whole = np.linspace(0.0, 1.0, len(time))
+        line = reach.timeline
+        times = line.contact + whole * (line.release - line.contact)
+        grasp = self.reaching.grasp(reach, number, Target(profile, places(whole)), times)
+        share = unhurried(time, lambda each: arm.shaped(arm.shape(grasp.holding(places(each)))))
+        return share, drawn(share)
+
+    def _as_at_rest(self, number: int, seen: Places) -> Places:
+        """Places as an arm would have them whose body is at rest."""
+        shift, turn = self.reaching.standings[number]
+        return Places(
+            rotate(conjugate(turn), seen.positions - shift),
+            multiply(conjugate(turn), seen.rotations),
+        )
+
+    def _risen(self, reach: Reach, share: Floats, positions: Floats, rotations: Floats) -> Floats:
+        """By how much (frames, 3) an object at positions (frames, 3) and rotations (frames, 4),
+        world, is to be higher so that it goes no deeper into the ground than where it was found, by
+        shares (frames,) of the way on which it is taken.
+
+        What is turned over on its way to the mouth has the arm below it then.
+        """
+        travelling, result = self.travelling, np.zeros_like(positions)
+        if travelling.ground is None or reach.profile is None:
+            return result
+        skin = travelling.scale * float(np.mean([each.mean() for each in self.reaching.radii]))
+        outline = rotate(rotations[:, None], reach.profile.outline[::_OUTLINED])
+        deeper = travelling.sunk(positions[:, None] + outline)
+        deeper = deeper - deeper[0] + 2.0 * skin * share * (reach.brought is not None)
+        rise = 0.5 * (deeper + np.hypot(deeper, _ROUNDED * skin))
+        result[:, 2] = least_jerk(share / _SOON) * rise
+        return result
 
 
 def _taken(busy: Sequence[tuple[int, Reach]], number: int, reach: Reach) -> Reach | None:

@@ -6,10 +6,9 @@ model system for studying the control of flexible arms" (Journal of Neuroscience
 that an octopus reaches by pushing a bend along its arm: what lies before the bend is straight and
 points at the target, what lies behind follows it curled; the bend's speed has one peak between
 start and end, and the movement stays near a plane. Here time is given to each stretch of the way as
-it turns the arm, along a course of least jerk (Flash and Hogan 1985), ``10 t³ − 15 t⁴ + 6 t⁵``,
-whose speed is such a bell. What lies behind the bend is a logarithmic spiral: its radius is in
-proportion to what is left of the arm, so it does not run into itself. Suckers face outwards there,
-and lead at the bend, as they do in nature.
+it turns the arm, on a course whose speed is such a bell (``even_bell``). What lies behind the bend
+is a logarithmic spiral: its radius is in proportion to what is left of the arm, so it does not run
+into itself. Suckers face outwards there, and lead at the bend, as they do in nature.
 
 After the touch the same front runs on to the tip, and the arm winds about the object as it passes.
 An arm that only curls up has the same spiral, which forms at its tip.
@@ -17,7 +16,7 @@ An arm that only curls up has the same spiral, which forms at its tip.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -73,6 +72,7 @@ _TAKES: Final = 0.4
 """The same within which what it holds comes to stay where it is, and stays there no more."""
 _SAMPLES: Final = 65
 """Moments of a part of a reach at which is looked how it turns."""
+_EVEN_SHARES: Final = np.linspace(0.0, 1.0, _SAMPLES)
 _LOUDEST: Final = 6.0
 """Power of the mean over an arm's bones of how far they turn: nearly the largest, and smooth."""
 _EVEN: Final = 0.25
@@ -116,18 +116,33 @@ class Timeline:
 
     def progress(self, times: Floats, pace: Pace | None = None) -> Progress:
         """How far reaching out, winding and going back are at times (frames,)."""
-        spans = (
+        shares = [
+            even_bell((times - begin) / max(end - begin, _AT_ONCE)) for begin, end in self.spans
+        ]
+        if pace is not None:
+            shares = [
+                np.interp(share, own, _EVEN_SHARES)
+                for share, own in zip(shares, pace.ways, strict=True)
+            ]
+        return Progress(*shares)
+
+    @property
+    def spans(self) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
+        """First and last frame of reaching out, of winding and of going back."""
+        return (
             (self.start, self.contact),
             (self.contact, self.closed),
             (self.release, self.end),
         )
-        shares = [least_jerk((times - begin) / max(end - begin, _AT_ONCE)) for begin, end in spans]
-        if pace is not None:
-            even = np.linspace(0.0, 1.0, _SAMPLES)
-            shares = [
-                np.interp(share, own, even) for share, own in zip(shares, pace.ways, strict=True)
-            ]
-        return Progress(*shares)
+
+    def passing(self, pace: Pace | None = None) -> tuple[Floats, ...]:
+        """Frames (moments,) at which each part is so far as ``Pace.of`` looks at it."""
+        ways = (_EVEN_SHARES,) * 3 if pace is None else pace.ways
+        course = even_bell(_EVEN_SHARES)
+        return tuple(
+            begin + (end - begin) * np.interp(way, course, _EVEN_SHARES)
+            for (begin, end), way in zip(self.spans, ways, strict=True)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,26 +202,51 @@ class Pace:
     ways: tuple[Floats, Floats, Floats]
 
     @classmethod
-    def of(cls, shape: Callable[[Progress], Floats]) -> Pace:
+    def of(cls, shape: Callable[[Progress, Floats], Floats], passing: Sequence[Floats]) -> Pace:
         """The pace at which no part of the way is hurried, from the frames (moments, bones, 4) that
-        an arm has at some progress.
+        an arm has at some progress; each part is ``passing`` it at frames (moments,).
         """
-        even = np.linspace(0.0, 1.0, _SAMPLES)
-        none, whole = np.zeros(_SAMPLES), np.ones(_SAMPLES)
+        even, none, whole = _EVEN_SHARES, np.zeros(_SAMPLES), np.ones(_SAMPLES)
         parts = (
             Progress(even, none, none),
             Progress(whole, even, none),
             Progress(whole, whole, even),
         )
-        ways: list[Floats] = []
-        for part in parts:
-            frames = shape(part)
-            turned = angle_between(frames[:-1], frames[1:])
-            most = np.sum(turned**_LOUDEST, axis=-1) ** (1.0 / _LOUDEST)
-            most = blurred(most[:, None], _SAMPLES // 32)[:, 0]
-            way = np.cumsum(np.append(0.0, most + _EVEN * (most.mean() + _AT_ONCE)))
-            ways.append(way / way[-1])
-        return cls((ways[0], ways[1], ways[2]))
+        out, wound, back = (
+            _turned(shape(part, times)) for part, times in zip(parts, passing, strict=True)
+        )
+        return cls((out, wound, back))
+
+
+def unhurried(share: Floats, shape: Callable[[Floats], Floats]) -> Floats:
+    """Shares (…) of a way that hurries nowhere, from those of its time, by the frames (moments,
+    bones, 4) that an arm has at shares (moments,) of the way.
+    """
+    return np.interp(even_bell(share), _turned(shape(_EVEN_SHARES)), _EVEN_SHARES)
+
+
+def _turned(frames: Floats) -> Floats:
+    """Which share of its turning an arm has behind it, at the moments of its frames (moments,
+    bones, 4).
+    """
+    turned = angle_between(frames[:-1], frames[1:])
+    most = np.sum(turned**_LOUDEST, axis=-1) ** (1.0 / _LOUDEST)
+    most = blurred(most[:, None], _SAMPLES // 32)[:, 0]
+    way = np.cumsum(np.append(0.0, most + _EVEN * (most.mean() + _AT_ONCE)))
+    return way / way[-1]
+
+
+def even_bell(share: Floats) -> Floats:
+    """A way from rest to rest whose speed is a bell with a broad top, ``(1 − u⁴)²`` for u from −1
+    to 1: at its highest 1.41 times the mean, where that of least jerk is 1.88 times as high.
+    """
+    u = 2.0 * np.minimum(np.maximum(share, 0.0), 1.0) - 1.0
+    fourth = u * u * u * u
+    return 0.5 + 0.5 * u * (1.0 - fourth * (0.4 - fourth / 9.0)) / _BELL
+
+
+_BELL: Final = 1.0 - 0.4 + 1.0 / 9.0
+"""What is under half of it."""
 
 
 def front_width(lengths: Floats) -> float:

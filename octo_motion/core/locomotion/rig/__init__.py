@@ -55,6 +55,7 @@ from .poses import (
     object_transforms,
     root_bone_transforms,
     stretch_mantle,
+    turn_limits,
     where_it_helps,
 )
 
@@ -106,6 +107,7 @@ __all__ = [
     "stretch_mantle",
     "sucker_sides",
     "transport_frames",
+    "turn_limits",
     "turns_in_world",
     "where_it_helps",
 ]

@@ -344,6 +344,18 @@ def fastest_turn(rate: float, per_cycle: float) -> float:
     return max(_FASTEST / rate, _IN_A_CYCLE / per_cycle)
 
 
+def turn_limits(
+    rate: float, per_cycle: float, reaching: np.ndarray | None = None, every: int = 1
+) -> Floats:
+    """Radians (moments − every, arms) that bones may turn within a frame: as quick gaits are, so
+    may arms be, but those that are ``reaching`` (moments, arms). (1, 1) where none ever is.
+    """
+    most = fastest_turn(rate, per_cycle)
+    if reaching is None:
+        return np.full((1, 1), most)
+    return np.where(reaching[every:] | reaching[:-every], fastest_turn(rate, np.inf), most)
+
+
 def eased_turns(
     arms: Sequence[ArmFrames],
     rotations: Floats,
@@ -351,7 +363,7 @@ def eased_turns(
     held: Sequence[np.ndarray],
     *,
     rate: float,
-    per_cycle: float,
+    limits: Floats,
     every: int = 1,
     cyclic: bool = False,
     turning: Floats | None = None,
@@ -363,8 +375,8 @@ def eased_turns(
         rotations: (moments, bones, 4) of all arms, one after the other.
         orientations: (moments, 4) of the armature, world.
         held: for each arm (moments,) whether it is to stay as it is.
-        rate: frames per second …
-        per_cycle: … and in a cycle of the gait.
+        rate: frames per second.
+        limits: how far bones may turn, of :func:`turn_limits`.
         every: at every how many moments there is a frame.
         cyclic: whether the last moment is the first again.
         turning: what :func:`turns_in_world` says of them, if that is known.
@@ -373,15 +385,14 @@ def eased_turns(
         Rotations (moments, bones, 4), and how far each arm was changed (moments, arms), 0…1; none
         where nothing is too fast.
     """
-    most = fastest_turn(rate, per_cycle)
     result, changed, start = rotations, np.zeros((len(rotations), len(arms))), 0
     if turning is None:
         turning = turns_in_world(arms, rotations, orientations, every)
-    fast = (turning > most).any(axis=0)
+    limits = np.broadcast_to(limits, (len(turning), len(arms)))
     for number, arm in enumerate(arms):
         own = slice(start, start + len(arm.bones))
-        start = own.stop
-        if not fast[own].any():
+        start, most = own.stop, limits[:, number]
+        if not (turning[:, own] > most[:, None]).any():
             continue
         before = continuous(multiply(orientations[:, None], arm.from_bones(rotations[:, own])))
         if cyclic and np.any(np.sum(before[-1] * before[0], axis=-1) < 0.0):
@@ -401,7 +412,7 @@ def eased_turns(
 
 
 def _eased(
-    before: Floats, held: np.ndarray, most: float, *, every: int, rate: float, cyclic: bool
+    before: Floats, held: np.ndarray, most: Floats, *, every: int, rate: float, cyclic: bool
 ) -> tuple[Floats, Floats]:
     """Frames (moments, bones, 4) of an arm, world, with means where it is too fast, and how far
     these count (moments,).
@@ -430,12 +441,13 @@ def where_it_helps(
     eased: Floats,
     orientations: Floats,
     *,
-    most: float,
+    limits: Floats,
     every: int = 1,
     cyclic: bool = False,
 ) -> Floats:
     """Rotations (moments, bones, 4), eased from what they were before; as before wherever an arm
-    did not turn by more than the most radians, and where it still does by nearly as much more.
+    did not turn by more than it may, and where it still does by nearly as much more.
+
     Arguments are as of :func:`eased_turns`.
 
     Each stretch of an arm counts by itself: what cannot be helped at one place of a long way
@@ -443,19 +455,19 @@ def where_it_helps(
     """
     then, now = (turns_in_world(arms, each, orientations, every) for each in (before, eased))
     result, start = eased.copy(), 0
-    for arm in arms:
+    limits = np.broadcast_to(limits, (len(then), len(arms)))
+    for number, arm in enumerate(arms):
         own = slice(start, start + len(arm.bones))
-        start = own.stop
+        start, most = own.stop, limits[:, number, None]
         stretches = [[each] for each in spans((before[:, own] != eased[:, own]).any(axis=(1, 2)))]
         if cyclic and len(stretches) > 1 and _goes_round(stretches, len(before)):
             stretches = [stretches[-1] + stretches[0], *stretches[1:-1]]
         for stretch in stretches:
             was, left = (
                 max(
-                    each[max(first - every, 0) : end, own].max(initial=0.0)
+                    (each[:, own] - most)[max(first - every, 0) : end].max(initial=-np.inf)
                     for first, end in stretch
                 )
-                - most
                 for each in (then, now)
             )
             if left > _HELPED * was or was <= 0.0:
@@ -469,9 +481,9 @@ def _goes_round(stretches: list[list[tuple[int, int]]], count: int) -> bool:
     return stretches[0][0][0] == 0 and stretches[-1][0][1] == count
 
 
-def _faster(frames: Floats, most: float, every: int) -> np.ndarray:
+def _faster(frames: Floats, most: Floats, every: int) -> np.ndarray:
     """Moments (moments,) within a frame in which some bone of frames (moments, bones, 4) turns by
-    more than so many radians.
+    more than so many radians (moments − every,).
     """
     over, result = _turns(frames, every) > most, np.zeros(len(frames), dtype=bool)
     for step in range(every + 1):

@@ -22,7 +22,13 @@ from ..reading import bones_of
 from ..settings import MODES, SETTINGS_ALONG, locomotion_settings
 
 _SECONDS_TO_REACH: Final = 1.25
+_SECONDS_TO_COIL: Final = 1.5
+"""Twice round: in less, the tip turns by more than 30° in a frame."""
+_SECONDS_TO_BRING: Final = 1.7
 _SECONDS_TO_HOLD: Final = 2.0
+_SECONDS_WOUND: Final = 0.75
+"""A body that walks on has soon gone too far."""
+_SECONDS_BACK: Final = 1.7
 
 
 _REACHES: Final = ListKind(
@@ -96,7 +102,13 @@ class OCTO_MOTION_OT_reach_add(ArmatureOperator, bpy.types.Operator):
         item.name, item.arm, item.target, item.mode = name, arm, target, mode
         item.frame_contact = scene.frame_current
         item.frame_start = item.frame_contact - round(_SECONDS_TO_REACH * rate)
-        item.frame_release = item.frame_contact + round(_SECONDS_TO_HOLD * rate)
+        item.coil_frames = round(_SECONDS_TO_COIL * rate)
+        item.bring_frames = round(_SECONDS_TO_BRING * rate)
+        item.back_frames = round(_SECONDS_BACK * rate)
+        lasts = _SECONDS_TO_HOLD
+        if mode == "COIL":
+            lasts = _SECONDS_TO_COIL + _SECONDS_WOUND
+        item.frame_release = item.frame_contact + round(lasts * rate)
         if mode == "MOUTH":
             # It stays at the mouth as long as the arm would hold it, and it is a long way back.
             item.frame_release += item.coil_frames + item.bring_frames

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_arm
-from octo_motion.core.locomotion.rig.poses import eased_turns, where_it_helps
+from octo_motion.core.locomotion.rig.poses import eased_turns, turn_limits, where_it_helps
 from octo_motion.core.rotations import Floats, from_axis_angle
 from tests.core.rigs import body_with_arms
 
@@ -45,7 +45,7 @@ def test_a_bone_that_flips_in_the_air_takes_its_time(rate: float, degrees: float
     bones = len(arms[0].bones)
     rotations = flipping(np.radians(degrees), 120, len(arms), bones, 3)
     free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
-    found = eased_turns(arms, rotations, STILL, free, rate=rate, per_cycle=SLOWLY)
+    found = eased_turns(arms, rotations, STILL, free, rate=rate, limits=turn_limits(rate, SLOWLY))
     assert found is not None
     eased, changed = found
     assert largest(eased) <= 1.001 * FASTEST / rate
@@ -61,7 +61,10 @@ def test_what_is_slow_enough_is_left_alone() -> None:
     arms = arms_of()
     rotations = flipping(0.9 * FASTEST / 24.0, 120, len(arms), len(arms[0].bones), 3)
     free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
-    assert eased_turns(arms, rotations, STILL, free, rate=24.0, per_cycle=SLOWLY) is None
+    assert (
+        eased_turns(arms, rotations, STILL, free, rate=24.0, limits=turn_limits(24.0, SLOWLY))
+        is None
+    )
 
 
 def test_an_arm_that_holds_on_lets_go_only_of_what_would_pop() -> None:
@@ -69,14 +72,14 @@ def test_an_arm_that_holds_on_lets_go_only_of_what_would_pop() -> None:
     bones = len(arms[0].bones)
     held = [np.ones(FRAMES, dtype=bool)] * len(arms)
     some = flipping(1.2 * FASTEST / 24.0, 120, len(arms), bones, 3)
-    assert eased_turns(arms, some, STILL, held, rate=24.0, per_cycle=SLOWLY) is None
+    assert eased_turns(arms, some, STILL, held, rate=24.0, limits=turn_limits(24.0, SLOWLY)) is None
     found = eased_turns(
         arms,
         flipping(np.radians(120.0), 120, len(arms), bones, 3),
         STILL,
         held,
         rate=24.0,
-        per_cycle=SLOWLY,
+        limits=turn_limits(24.0, SLOWLY),
     )
     assert found is not None
     assert largest(found[0]) < np.radians(45.0)
@@ -86,8 +89,31 @@ def test_a_gait_in_a_hurry_may_turn_faster() -> None:
     arms = arms_of()
     rotations = flipping(np.radians(40.0), 120, len(arms), len(arms[0].bones), 3)
     free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
-    assert eased_turns(arms, rotations, STILL, free, rate=24.0, per_cycle=24.0) is None
-    assert eased_turns(arms, rotations, STILL, free, rate=24.0, per_cycle=60.0) is not None
+    assert (
+        eased_turns(arms, rotations, STILL, free, rate=24.0, limits=turn_limits(24.0, 24.0)) is None
+    )
+    assert (
+        eased_turns(arms, rotations, STILL, free, rate=24.0, limits=turn_limits(24.0, 60.0))
+        is not None
+    )
+
+
+def test_an_arm_that_reaches_takes_its_time_in_a_hurry_too() -> None:
+    arms = arms_of()
+    bones = len(arms[0].bones)
+    rotations = flipping(np.radians(40.0), 120, len(arms), bones, 3)
+    rotations[180:, bones + 3] = rotations[120, 3]
+    free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
+    reaching = np.zeros((FRAMES, len(arms)), dtype=bool)
+    reaching[100:150, 0] = True
+    limits = turn_limits(24.0, 24.0, reaching)
+    found = eased_turns(arms, rotations, STILL, free, rate=24.0, limits=limits)
+    assert found is not None
+    eased, _ = found
+    assert largest(eased[:150]) <= 1.001 * FASTEST / 24.0
+    np.testing.assert_array_equal(eased[:, bones:], rotations[:, bones:])
+    helped = where_it_helps(arms, rotations, eased, STILL, limits=limits)
+    np.testing.assert_array_equal(helped, eased)
 
 
 def test_each_stretch_counts_by_itself() -> None:
@@ -99,13 +125,15 @@ def test_each_stretch_counts_by_itself() -> None:
     # A little too fast early on, far too fast later.
     before = flipping(1.1 * most, 60, len(arms), bones, 3)
     before[180:, 3] = from_axis_angle(np.array([1.0, 0.0, 0.0]), np.array(4.0 * most))
-    eased, _ = eased_turns(arms, before, STILL, free, rate=24.0, per_cycle=SLOWLY) or (before, None)
+    eased, _ = eased_turns(
+        arms, before, STILL, free, rate=24.0, limits=turn_limits(24.0, SLOWLY)
+    ) or (before, None)
     assert largest(eased) <= 1.001 * most
     # Something brings the later one back nearly to where it was.
     spoilt = eased.copy()
     spoilt[120:] = before[120:]
     spoilt[180] = spoilt[179]
-    found = where_it_helps(arms, before, spoilt, STILL, most=most)
+    found = where_it_helps(arms, before, spoilt, STILL, limits=np.full((1, 1), most))
     assert largest(found[:120]) <= 1.001 * most
     np.testing.assert_array_equal(found[120:], before[120:])
 
@@ -116,4 +144,6 @@ def test_a_stretch_in_which_nothing_was_too_fast_stays_as_it_was() -> None:
     before = flipping(0.9 * most, 120, len(arms), len(arms[0].bones), 3)
     changed = before.copy()
     changed[118:123, 3] = before[118, 3]
-    np.testing.assert_array_equal(where_it_helps(arms, before, changed, STILL, most=most), before)
+    np.testing.assert_array_equal(
+        where_it_helps(arms, before, changed, STILL, limits=np.full((1, 1), most)), before
+    )
