@@ -150,7 +150,7 @@ def beside_the_way(settings: Any, off: float, size: float) -> Any:
     place = middle + off * unit * aside
     _, height, *_ = settings.ground.object.ray_cast((*place[:2], 10.0), (0.0, 0.0, -1.0))
     place[2] = height[2] + size * unit
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=size * unit, location=place)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=size * unit, location=tuple(place))
     thing: Any = bpy.context.object
     bpy.context.view_layer.objects.active = armature
     return thing

@@ -128,7 +128,7 @@ _BONES_IN_BRIEF: Final = 3_500
 """… and where Blender goes on meanwhile; the numbers are the same."""
 _EASINGS: Final = 4
 """How often bones that turn too fast are given more time, and kept off the ground again."""
-_FIRMLY: Final = 0.5
+_FIRMLY: Final = 0.95
 """How far an arm holds something from which on it stays as it is, as one that stands."""
 _FLOOR_AROUND: Final = 2.5
 """Arm lengths to all sides of the body in which the floor is looked at …"""
