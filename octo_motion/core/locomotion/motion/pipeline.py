@@ -397,8 +397,20 @@ def _hand_over(plan: MotionPlan, posed: _Posed) -> None:
     below = None
     if ground is not None and not plan.job.in_place and plan.carry is None:
         below = ground, plan.standing[0].radii
-    around = ArmsAround(creature, frames, posed.going, below)
-    hand_over_arms(posed.hands, posed.arms, around)
+    around, arms = ArmsAround(creature, frames, posed.going, below), posed.arms
+    hand_over_arms(posed.hands, arms, around)
+    if plan.carry is not None:
+        return
+    # Far from its pose an arm may have to be elsewhere at once: it sets out earlier, as in a walk.
+    over = np.any([hand.time < 1.0 for hand in posed.hands], axis=0)
+    ends = [hand.moment for hand in posed.hands if hand.time[hand.moment] <= 0.0]
+    over[ends] = False
+    held = [~over] * len(frames)
+    before, limits = arms.rotations.copy(), turn_limits(plan.job.timing.rate, np.inf)
+    # A pose may lie in the ground, and is left gently.
+    above = np.prod([hand.share for hand in posed.hands], axis=0)[:, None]
+    _give_time(plan, arms, posed.going, held, limits, above=above, cyclic=False)
+    arms.rotations[ends] = before[ends]
 
 
 def _carried(
@@ -728,8 +740,7 @@ def _take_time(
 
     Radians (moments − stride, bones) by which they turn within a frame, if none did.
     """
-    job, every = plan.job, plan.stride
-    creature = job.creature
+    job, every, creature = plan.job, plan.stride, plan.job.creature
     holding, reaching = np.zeros(arms.late.shape, dtype=bool), None
     if reached is not None:
         holding = np.stack([each.max(axis=1) > _FIRMLY for each in reached.held], axis=1)
@@ -738,16 +749,36 @@ def _take_time(
         (lying.any(axis=1) & (late <= MISS)) | own
         for lying, late, own in zip(arms.in_contact, arms.late.T, holding.T, strict=True)
     ]
-    frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
-    before, rate = arms.rotations, job.timing.rate
-    limits = turn_limits(rate, plan.pace.fastest, reaching, every)
-    turning = turns_in_world(frames, before, going[1], every)
+    limits = turn_limits(job.timing.rate, plan.pace.fastest, reaching, every)
     if not any(gait.poser.settings.smoothing_cycles for gait in plan.segments.gaits):
-        return turning
+        frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
+        return turns_in_world(frames, arms.rotations, going[1], every)
+    return _give_time(plan, arms, going, held, limits, cyclic=cyclic)
+
+
+def _give_time(
+    plan: MotionPlan,
+    arms: ArmMotion,
+    going: Travelled,
+    held: Sequence[np.ndarray],
+    limits: Floats,
+    *,
+    above: Floats | float = 1.0,
+    cyclic: bool,
+) -> Floats | None:
+    """Let bones take their time that turn by more than the limits, but of arms while they are held
+    (moments,), and off the ground, as far (moments, 1) as they are to be above it.
+
+    Radians (moments − stride, bones) by which they turn within a frame, if none did.
+    """
+    job, every, creature = plan.job, plan.stride, plan.job.creature
+    frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
+    before = arms.rotations
+    turning = turns_in_world(frames, before, going[1], every)
     for number in range(_EASINGS):
         eased = eased_turns(
             *(frames, arms.rotations, going[1], held),
-            rate=rate,
+            rate=job.timing.rate,
             limits=limits,
             every=every,
             cyclic=cyclic,
@@ -764,7 +795,8 @@ def _take_time(
             poses = Poses(arms.rotations, arms.strains, *going)
             radii = [creature.scale * each for each in plan.standing[0].radii]
             closer = MARGIN if last else 0.0
-            arms.rotations = keep_off_ground(course, poses, radii, changed, closer=closer)
+            share = above * changed
+            arms.rotations = keep_off_ground(course, poses, radii, share, closer=closer)
     if arms.rotations is before:
         return turning
     # Where it is no help, it is no good either.
