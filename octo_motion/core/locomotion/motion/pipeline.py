@@ -16,6 +16,7 @@ import numpy as np
 from ...keyframes import Channel
 from ...phrases import phrase
 from ...rotations import IDENTITY, Floats, conjugate, from_matrix, multiply, rotate, slerp
+from ...smoothing import smooth_step
 from ..body import BodyMoments, OrganPoses, carriages, pose_organs
 from ..clearance import (
     ArmsOverGround,
@@ -128,6 +129,9 @@ _BONES_IN_BRIEF: Final = 3_500
 """… and where Blender goes on meanwhile; the numbers are the same."""
 _EASINGS: Final = 4
 """How often bones that turn too fast are given more time, and kept off the ground again."""
+_DEEP: Final = 0.1
+"""Arm lengths that an arm lies in the ground in a pose, from which on it is not made to leave that
+sooner than its pose."""
 _FIRMLY: Final = 0.95
 """How far an arm holds something from which on it stays as it is, as one that stands."""
 _FLOOR_AROUND: Final = 2.5
@@ -407,8 +411,17 @@ def _hand_over(plan: MotionPlan, posed: _Posed) -> None:
     over[ends] = False
     held = [~over] * len(frames)
     before, limits = arms.rotations.copy(), turn_limits(plan.job.timing.rate, np.inf)
-    # A pose may lie in the ground, and is left gently.
-    above = np.prod([hand.share for hand in posed.hands], axis=0)[:, None]
+    above = np.ones(arms.late.shape)
+    for hand in posed.hands:
+        if below is None:
+            break
+        # Out of a pose that lies in the ground an arm comes gently.
+        here = slice(hand.moment, hand.moment + 1 or None)
+        course = ArmsOverGround(frames, below[0], creature.scale)
+        where = (each[here] for each in posed.going)
+        joints = course.joints(Poses(arms.rotations[here], arms.strains[here], *where))
+        deep = smooth_step(-course.clear(joints) / _DEEP)
+        above *= 1.0 - deep * (1.0 - hand.share)[:, None]
     _give_time(plan, arms, posed.going, held, limits, above=above, cyclic=False)
     arms.rotations[ends] = before[ends]
 
@@ -767,7 +780,7 @@ def _give_time(
     cyclic: bool,
 ) -> Floats | None:
     """Let bones take their time that turn by more than the limits, but of arms while they are held
-    (moments,), and off the ground, as far (moments, 1) as they are to be above it.
+    (moments,), and off the ground, as far (moments, arms) as they are to be above it.
 
     Radians (moments − stride, bones) by which they turn within a frame, if none did.
     """
