@@ -16,7 +16,7 @@ import numpy as np
 from ...keyframes import Channel
 from ...phrases import phrase
 from ...rotations import IDENTITY, Floats, conjugate, from_matrix, multiply, rotate, slerp
-from ...smoothing import smooth_step
+from ...smoothing import covered, smooth_step
 from ..body import BodyMoments, OrganPoses, carriages, pose_organs
 from ..clearance import (
     ArmsOverGround,
@@ -129,6 +129,8 @@ _BONES_IN_BRIEF: Final = 3_500
 """… and where Blender goes on meanwhile; the numbers are the same."""
 _EASINGS: Final = 4
 """How often bones that turn too fast are given more time, and kept off the ground again."""
+_GENTLY: Final = 0.12
+"""Seconds in which an arm that reaches sets out from where it stands, however short its way is."""
 _DEEP: Final = 0.1
 """Arm lengths that an arm lies in the ground in a pose, from which on it is not made to leave that
 sooner than its pose."""
@@ -766,7 +768,24 @@ def _take_time(
     if not any(gait.poser.settings.smoothing_cycles for gait in plan.segments.gaits):
         frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
         return turns_in_world(frames, arms.rotations, going[1], every)
-    return _give_time(plan, arms, going, held, limits, cyclic=cyclic)
+    before = arms.rotations
+    turning = _give_time(plan, arms, going, held, limits, cyclic=cyclic)
+    if reached is not None and arms.rotations is not before:
+        _hold_on(plan, arms, before, reached)
+    return turning
+
+
+def _hold_on(plan: MotionPlan, arms: ArmMotion, before: Floats, reached: Reached) -> None:
+    """Let arms that are going to reach, or have just done so, stand as before, rotations (moments,
+    bones, 4), and set out and come back gently: one that has little time would leave at once.
+    """
+    gently = max(1, round(_GENTLY * plan.stride * plan.job.timing.rate))
+    for number in np.flatnonzero(reached.away.any(axis=0)).tolist():
+        stands = arms.in_contact[number].any(axis=1) & (reached.away[:, number] <= 0.0)
+        share = 1.0 - covered(stands.astype(np.float64), gently)
+        bones, some = plan.segments.bones_of[number], share < 1.0
+        own, eased = before[some, bones], arms.rotations[some, bones]
+        arms.rotations[some, bones] = slerp(own, eased, share[some, None])
 
 
 def _give_time(
