@@ -156,6 +156,7 @@ def ours() -> Floats:
     places = Places(np.tile(place, (len(times), 1)), np.tile(IDENTITY, (len(times), 1)))
     target = Target(profile_of(*objects.rod()), places, "'Rod'")
     grasp = plan_grasp(arm, radii, target, timeline, times, mode="TOUCH", name="'Arm'")
+    grasp = grasp.paced(times, target.places)
     still = np.tile(IDENTITY, (len(times), _POINTS, 1))
     return arm.joints(arm.from_bones(grasp.apply(times, places, still))) / arm.length
 

@@ -400,8 +400,7 @@ def plan_grasp(
             plans.append((abs(twist) - 1e-3 * sense, replace(loose, twist=twist)))
     if not plans:
         raise _too_far(arm, target, times[held], holding, name)
-    best = min(plans, key=itemgetter(0))[1]
-    return best.paced(times, places)
+    return min(plans, key=itemgetter(0))[1]
 
 
 def _coil(arm: ArmFrames, skins: Skins, places: Places, winding: Winding) -> Coil | None:
@@ -870,13 +869,12 @@ class _Work:
             start, own = seen.positions[held[0]], seen.rotations[held[0]]
             places, turned = np.tile(start, (len(held), 1)), np.tile(own, (len(held), 1))
             line = reach.timeline
-            took = line.end - line.release if reach.brought is None else reach.brought - line.closed
-            share = (times[held] - line.closed) / max(took, 1e-6)
             if reach.brought is None or reach.profile is None:
-                share = even_bell(share)
+                share = even_bell((times[held] - line.closed) / (line.end - line.release))
             else:
                 number = self.reaching.arm_of(reach, times, seen)
-                share, (places, turned) = self._drawn_in(reach, number, start, own, share)
+                begins = start, own
+                share, (places, turned) = self._drawn_in(reach, number, begins, times[held])
             positions, rotations = reach.positions.copy(), reach.rotations.copy()
             turn = travelling.orientations[held]
             positions[held] = travelling.locations[held] + travelling.scale * rotate(turn, places)
@@ -886,26 +884,25 @@ class _Work:
             self.ways[reach.target] = replace(reach, positions=positions, rotations=rotations)
 
     def _drawn_in(
-        self, reach: Reach, number: int, start: Floats, own: Floats, time: Floats
+        self, reach: Reach, number: int, begins: tuple[Floats, Floats], times: Floats
     ) -> tuple[Floats, tuple[Floats, Floats]]:
-        """Shares (moments,) of the way from a position (3,) and rotation (4,) to the mouth, by
-        shares of its time, such that the arm is hurried nowhere; and where the object is then.
+        """Shares of the way from a position (3,) and rotation (4,) to the mouth at times (moments,)
+        from when it is held, such that the arm is hurried nowhere; and where the object is then.
         """
         assert reach.profile is not None
-        profile = reach.profile.scaled(1.0 / self.travelling.scale)
-        arm = self.reaching.frames[number]
+        assert reach.brought is not None
+        profile, closed = reach.profile.scaled(1.0 / self.travelling.scale), reach.timeline.closed
 
         def drawn(share: Floats) -> tuple[Floats, Floats]:
-            return self.reaching.drawn_in(profile, start, own, share, number)
+            return self.reaching.drawn_in(profile, *begins, share, number)
 
         def places(share: Floats) -> Places:
             return self._as_at_rest(number, Places(*drawn(share)))
 
-        whole = np.linspace(0.0, 1.0, len(time))
-        line = reach.timeline
-        times = line.contact + whole * (line.release - line.contact)
-        grasp = self.reaching.grasp(reach, number, Target(profile, places(whole)), times)
-        share = unhurried(time, lambda each: arm.shaped(arm.shape(grasp.holding(places(each)))))
+        evenly = np.linspace(0.0, 1.0, len(times))
+        grasp = self.reaching.grasp(reach, number, Target(profile, places(evenly)), times)
+        took = max(reach.brought - closed, 1e-6)
+        share = unhurried((times - closed) / took, lambda each: grasp.holding(places(each)))
         return share, drawn(share)
 
     def _as_at_rest(self, number: int, seen: Places) -> Places:

@@ -76,6 +76,7 @@ def case(
     profile = profile_of(*(form or objects.rod()))
     target = Target(profile, places or still(times), "'Rod'")
     grasp = plan_grasp(arm, radii, target, TIMELINE, times, mode=mode, name="'Arm 1 L'")
+    grasp = grasp.paced(times, target.places)
     generator = GaitPoser(skeleton, arms, body, GaitSettings(gait.gait_presets()["walk"]))
     return Case(arm, radii, grasp, generator, slice(0, joints))
 
