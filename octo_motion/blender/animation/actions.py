@@ -58,7 +58,7 @@ CHANNELS_AT_ONCE: Final = 6
 or so."""
 _CURVES_AT_ONCE: Final = 50
 """How many are read at one step to see whether they have been edited."""
-_TOLD_AT_ONCE: Final = 60
+_TOLD_AT_ONCE: Final = 20
 """How many Blender looks at anew at one step: after each of them it works the frame out again."""
 _LEAST_SPACING: Final = 0.01
 """Blender takes keys that are no further apart, in frames, for one and the same."""
