@@ -67,8 +67,9 @@ _LIFT: Final = 0.25
 _HEAP: Final = (0.7, 0.2)
 """Shares of the free part's length that its way has, from which on it begins to make a knee, and at
 which it does nothing else."""
-_KNEE: Final = np.array([3.0, 1.5, 1.5])
-"""Which way a knee goes: out from the body and back again, up and down again, and down midway."""
+_KNEE: Final = np.array([1.5, 0.75, 0.75, 0.5])
+"""Which way a knee goes, in lengths of the free part: out from the body and back again, up and down
+again, and midway down and to the side where the object is."""
 _CLEAR: Final = 0.85
 """Of the skin's radius: joints on their way keep so far from the object."""
 _CLEAR_BETWEEN: Final = 0.65
@@ -83,6 +84,12 @@ _TOGETHER: Final = 2
 """How many joints on either side of one give way with it."""
 _FARTHEST: Final = 0.4
 """Bone lengths that a joint gives way in one go."""
+_ENDINGS: Final = 12
+"""Steps in which the free part comes to end where the coil begins …"""
+_MOST_AT_ONCE: Final = 0.5
+"""… and radians that a bone turns in one of them, at most."""
+_STIFF: Final = 1e-4
+"""What a straight arm yields to a pull along it, for the pull to be of some size."""
 _CLOSING: Final = 20
 """Steps of Newton's method: an arm that is close to what it holds is folded up a lot."""
 _PACINGS: Final = 3
@@ -172,27 +179,31 @@ class Grasp:
         """How often it winds round the object."""
         return self.coil.angle / (2.0 * np.pi)
 
-    def holding(self, places: Places) -> Floats:
-        """Frames (frames, segments, 4) of the arm that holds the object where it is."""
+    def holding(self, places: Places, touched: int = 0) -> Floats:
+        """Frames (frames, segments, 4) of the arm that holds the object where it is, at frames that
+        follow one another; at one of them, by its number, it has touched it.
+        """
         arm, coil, first = self.arm, self.coil, self.coil.first
         wound = len(coil.facing)
         own = frame_of(coil.directions, coil.facing)
         held = multiply(places.rotations[:, None], own)
         result = np.empty((len(places.positions), len(arm.bones), 4))
-        result[:, :first] = self._free(places, held[:, 0])
+        result[:, :first] = self._free(places, held[:, 0], touched)
         result[:, first : first + wound] = held
         # What is left of the arm goes on straight; the reach bends it off.
         result[:, first + wound :] = held[:, -1:]
         return result
 
-    def _free(self, places: Places, held: Floats) -> Floats:
+    def _free(self, places: Places, held: Floats, touched: int) -> Floats:
         """Frames (frames, first, 4) from the body to the coil."""
         arm, first = self.arm, self.coil.first
         goal = places.seen(self.coil.joints[0]) - arm.root
         lengths = arm.lengths[:first]
         outward = rotate(arm.at_rest[0], _X)
-        shape = _approach(lengths, goal, held, outward=outward, up=self.up)
-        shape = close_group(np.ascontiguousarray(shape), lengths, goal.T, _CLOSING)
+        aside = np.cross(self.up, outward)
+        aside = aside if goal[touched] @ aside >= 0.0 else -aside
+        shape = _approach(lengths, goal, held, outward=outward, up=self.up, aside=aside)
+        shape = _ended_at(goal.T, np.ascontiguousarray(shape), lengths)
         near = np.arange(len(goal))
         for _ in range(_CLEARINGS):
             joints = arm.root + np.cumsum(
@@ -206,11 +217,13 @@ class Grasp:
             joints[:, :-1] += shifts[moves]
             pushed = np.diff(joints, axis=1, prepend=np.broadcast_to(arm.root, (len(near), 1, 3)))
             pushed = np.ascontiguousarray(np.moveaxis(normalized(pushed), 0, -1))
-            shape[..., near] = close_group(pushed, lengths, goal[near].T, _CLOSING)
+            shape[..., near] = _ended_at(goal[near].T, pushed, lengths)
         directions = np.moveaxis(shape, -1, 0)
         frames = transport_frames(directions, np.broadcast_to(arm.at_rest[0], (len(goal), 4)))
-        twist = _twist(frames[:, -1], held)
-        twist = self.twist + less_whole_turns(twist - self.twist)
+        # It goes on as the object turns, beyond half a turn too.
+        twist = np.unwrap(_twist(frames[:, -1], held))
+        before = twist[touched] - self.twist
+        twist -= before - less_whole_turns(before)
         share = np.cumsum(lengths) / lengths.sum()
         angle = twist[:, None] * smooth_step((share - 1.0 + _TWISTED) / _TWISTED)
         return multiply(frames, from_axis_angle(_X, angle))
@@ -296,7 +309,7 @@ class Grasp:
         """
         arm, lengths = self.arm, self.arm.lengths
         front = self.front(progress)
-        holding = arm.shape(self.holding(places))
+        holding = arm.shape(self.holding(places, int(np.argmax(progress.holds))))
         reached = passed(lengths, front)
         last = self.coil.first + len(self.coil.facing)
         # Beyond the last turn the arm is left to curl off.
@@ -479,9 +492,9 @@ def _too_far(
 
 
 def _approach(
-    lengths: Floats, goal: Floats, held: Floats, *, outward: Floats, up: Floats
+    lengths: Floats, goal: Floats, held: Floats, *, outward: Floats, up: Floats, aside: Floats
 ) -> Floats:
-    """Shape (segments, 3, frames) of the way to a goal (frames, 3), before it is closed.
+    """Shape (segments, 3, frames) of the way to a goal (frames, 3), before it ends there.
 
     A cubic Hermite curve that leaves the body half outwards and arrives as the coil begins; what
     the arm is too long bows away from the object and from the ground.
@@ -503,12 +516,49 @@ def _approach(
         + (3.0 * u * u - 2.0 * u) * arrives
         + 3.0 * bowed * far * (1.0 - 2.0 * u) * bow
     )
-    # Much too long, it would lie in a heap, and which way that leads is not to be told.
-    out, rises, falls = _KNEE
-    knee = (1.0 - 2.0 * u) * (out * outward + rises * up) - 6.0 * falls * u * (1.0 - u) * up
-    heap = smooth_step((_HEAP[0] - far / ends[-1]) / (_HEAP[0] - _HEAP[1]))
-    shape = normalized(shape) + heap * (normalized(knee) - normalized(shape))
-    return np.moveaxis(normalized(shape), 1, -1)
+    # Not in one plane: so no bone's way comes to nothing, and turns over as the goal passes.
+    out, rises, falls, leans = _KNEE
+    knee = (1.0 - 2.0 * u) * (out * outward + rises * up)
+    knee = knee + 6.0 * u * (1.0 - u) * (leans * aside - falls * up)
+    heap = _heaped(far / ends[-1])
+    return np.moveaxis(normalized(shape / ends[-1] + heap * knee), 1, -1)
+
+
+def _heaped(share: Floats) -> Floats:
+    """How far (…) an arm makes a knee whose way has some share (…) of its length, 0…1: much too
+    long, it would lie in a heap, and which way that leads is not to be told.
+    """
+    return smooth_step((_HEAP[0] - share) / (_HEAP[0] - _HEAP[1]))
+
+
+def _ended_at(goal: Floats, directions: Floats, lengths: Floats) -> Floats:
+    """Directions (segments, 3, batch) in nearly a given shape that end at a goal (3, batch).
+
+    Bent as much as it takes (``close_group``); but what makes a knee keeps as near as can be to the
+    shape it has: the goal's direction, hardly to be told there, is not to turn it round. Of all
+    turns of its segments that bring the end to where it is wanted the least are taken, by Newton's
+    method.
+    """
+    ended = close_group(directions, lengths, goal, _CLOSING)
+    knee = _heaped(np.linalg.norm(goal, axis=0) / lengths.sum())
+    heaps = np.flatnonzero(knee > 0.0)
+    if len(heaps) == 0:
+        return ended
+    goal, squares = goal[:, heaps], lengths * lengths
+    near = ended[..., heaps] + knee[heaps] * (directions - ended)[..., heaps]
+    near /= np.linalg.norm(near, axis=1, keepdims=True)
+    whole = (1.0 + _STIFF) * float(squares.sum()) * np.eye(3)
+    for _ in range(_ENDINGS):
+        missing = goal - np.einsum("s,scb->cb", lengths, near)
+        # What the end moves by, if each segment turns by its own share of a pull at the end.
+        moves = whole - np.einsum("s,scb,sdb->bcd", squares, near, near)
+        turn = lengths[:, None, None] * np.linalg.solve(moves, missing.T[..., None])[..., 0].T
+        turn -= near * np.sum(turn * near, axis=1, keepdims=True)
+        most = np.linalg.norm(turn, axis=1).max(axis=0)
+        near += turn * np.minimum(1.0, _MOST_AT_ONCE / np.maximum(most, _MOST_AT_ONCE))
+        near /= np.linalg.norm(near, axis=1, keepdims=True)
+    ended[..., heaps] = close_group(near, lengths, goal, _CLOSING)
+    return ended
 
 
 def _twist(before: Floats, after: Floats) -> Floats:
@@ -866,15 +916,14 @@ class _Work:
                     "Let one of them carry it; the other arm may hold it as well.",
                 )
             seen = travelling.seen(reach.positions, reach.rotations)
-            start, own = seen.positions[held[0]], seen.rotations[held[0]]
-            places, turned = np.tile(start, (len(held), 1)), np.tile(own, (len(held), 1))
             line = reach.timeline
             if reach.brought is None or reach.profile is None:
+                start, own = seen.positions[held[0]], seen.rotations[held[0]]
+                places, turned = np.tile(start, (len(held), 1)), np.tile(own, (len(held), 1))
                 share = even_bell((times[held] - line.closed) / (line.end - line.release))
             else:
                 number = self.reaching.arm_of(reach, times, seen)
-                begins = start, own
-                share, (places, turned) = self._drawn_in(reach, number, begins, times[held])
+                share, (places, turned) = self._drawn_in(reach, number, seen, held)
             positions, rotations = reach.positions.copy(), reach.rotations.copy()
             turn = travelling.orientations[held]
             positions[held] = travelling.locations[held] + travelling.scale * rotate(turn, places)
@@ -884,14 +933,16 @@ class _Work:
             self.ways[reach.target] = replace(reach, positions=positions, rotations=rotations)
 
     def _drawn_in(
-        self, reach: Reach, number: int, begins: tuple[Floats, Floats], times: Floats
+        self, reach: Reach, number: int, seen: Places, held: np.ndarray
     ) -> tuple[Floats, tuple[Floats, Floats]]:
-        """Shares of the way from a position (3,) and rotation (4,) to the mouth at times (moments,)
-        from when it is held, such that the arm is hurried nowhere; and where the object is then.
+        """Shares of the way to the mouth of an object that is held at some frames (moments,), from
+        where it is seen at the first of them, such that the arm is hurried nowhere; and where the
+        object is then.
         """
         assert reach.profile is not None
         assert reach.brought is not None
         profile, closed = reach.profile.scaled(1.0 / self.travelling.scale), reach.timeline.closed
+        begins = seen.positions[held[0]], seen.rotations[held[0]]
 
         def drawn(share: Floats) -> tuple[Floats, Floats]:
             return self.reaching.drawn_in(profile, *begins, share, number)
@@ -899,10 +950,14 @@ class _Work:
         def places(share: Floats) -> Places:
             return self._as_at_rest(number, Places(*drawn(share)))
 
-        evenly = np.linspace(0.0, 1.0, len(times))
-        grasp = self.reaching.grasp(reach, number, Target(profile, places(evenly)), times)
+        # The grasp hangs on where the object was before, too.
+        known = self._as_at_rest(number, seen)
+        evenly = places(np.linspace(0.0, 1.0, len(held)))
+        known.positions[held], known.rotations[held] = evenly.positions, evenly.rotations
+        grasp = self.reaching.grasp(reach, number, Target(profile, known), self.times)
         took = max(reach.brought - closed, 1e-6)
-        share = unhurried((times - closed) / took, lambda each: grasp.holding(places(each)))
+        way = (self.times[held] - closed) / took
+        share = unhurried(way, lambda each: grasp.holding(places(each)))
         return share, drawn(share)
 
     def _as_at_rest(self, number: int, seen: Places) -> Places:
