@@ -12,12 +12,14 @@ from .corrections import (
     raising_between_frames,
     separating_arms,
 )
+from .way_past import Haste
 
 __all__ = [
     "DEEP",
     "ArmsOverGround",
     "BodyVolume",
     "Capsules",
+    "Haste",
     "Opened",
     "Separation",
     "afloat",

@@ -39,7 +39,7 @@ from ..rig import (
 )
 from .capsule_overlap import Capsules, Crowd, Opened, Separation, measuring_overlap
 from .overlap_solver import parting
-from .way_past import Passing, led_past
+from .way_past import Haste, Passing, led_past
 
 # --- Arms that keep apart, and are led past each other --------------------------------------------
 
@@ -143,6 +143,7 @@ def lead_past(
     ground: Ground | None,
     scale: float,
     frames_per_cycle: float,
+    haste: Haste,
 ) -> Floats | None:
     """Rotations (frames, bones, 4) of arms that reach past the others; none if they do anyway.
 
@@ -157,6 +158,7 @@ def lead_past(
         ground: what is below them, if anything.
         scale: metres of the armature's unit.
         frames_per_cycle: of the gait: the shorter, the quicker arms make way.
+        haste: how fast they may be led.
     """
     lying = [each > 0.0 for each in held]
     nobody = np.zeros(share.shape, dtype=bool)
@@ -171,6 +173,7 @@ def lead_past(
         passing,
         _floor(travel, ground, scale),
         width=width_of(frames_per_cycle),
+        haste=haste,
     )
     return crowd.turned(rotations, moved)
 

@@ -5,7 +5,8 @@ An arm that reaches crosses others, which stand or walk: it goes over them. Each
 Where the arm is too near to something, its joints are asked to move away from it and up, by as much
 as it is too near; then the arm gives way as an elastic rod does, all its segments turning as little
 and as evenly as it takes (``turned_towards``). What it holds stays where it is. All that is asked
-is a smooth function of where arms are, so nothing jumps that has not jumped before.
+is a smooth function of where arms are; but a little that is asked again and again can be a lot.
+Where an arm would be flung aside, it goes rather through what it meets.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 from ...content_cache import part_of
 from ...rotations import Floats
 from ...rotations.components_first import dot
-from ...smoothing import blurred, smooth_step
+from ...smoothing import blurred, covered, smooth_step
 from ...steps import finished
 from ..ground import drawn
 from .capsule_overlap import Capsules, Crowd, Touches, Touching
@@ -40,7 +41,22 @@ _STEPS: Final = 6
 """Newton's steps that draw an arm back to where it holds."""
 _SOFT: Final = 0.1
 """Share of a radius within which it begins gently to matter what is asked."""
+_TAKEN_BACK: Final = 8
+"""How often it is looked whether an arm is flung aside still."""
+_LEAST_BACK: Final = 0.3
+"""Share of the way aside that is taken back at least where it is."""
 _TINY: Final = 1e-12
+
+
+@dataclass(frozen=True)
+class Haste:
+    """How fast arms may be led."""
+
+    most: float
+    """Radians that a bone may turn in a frame, if it does not anyway, while the arm holds
+    something; twice that while it does not, for there it is given time."""
+    gently: int
+    """Width of the means over frames (``smoothing.covered``) by which they are led less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +80,12 @@ def led_past(
     floor: Floor | None,
     *,
     width: int,
+    haste: Haste,
 ) -> Floats | None:
     """Joints (frames, arms, joints, 3) where arms that reach keep clear; none if all do anyway.
 
-    Parts of the body have one frame, or one for each of the arms'.
+    Parts of the body have one frame, or one for each of the arms'; ``width`` is that of the means
+    over frames of what is asked (``smoothing.blurred``).
     """
     items = np.nonzero((passing.share > 0.0) | (passing.above > 0.0))
     if not len(items[0]):
@@ -76,24 +94,72 @@ def led_past(
     watched = (passing.share > 0.0).any(axis=1)
     finished(touching.looking_at(watched, np.zeros(0, dtype=np.intp)))
     rod = _Rods.of(crowd, passing, items)
-    joints, moved = crowd.joints.copy(), False
-    for _ in range(_ROUNDS):
-        wanted, weights = _wanted(crowd, touching.at(joints), passing)
-        wanted *= passing.share[..., None, None]
-        if floor is not None:
-            goals, matters = wanted[items], weights[items]
-            height = floor.clearance(items[0], joints[items])
-            lacking = (
-                np.maximum(crowd.radii[items[1]] - height, 0.0) * passing.above[items][:, None]
-            )
-            _rise(crowd.radii[items[1]], lacking, goals, matters, crowd.up[items[0]])
-            wanted[items], weights[items] = goals, matters
-        if not np.any(wanted):
+    joints = crowd.joints.copy()
+
+    def led(*, others: bool) -> bool:
+        """Whether anybody had to make way, for the others too or for the ground alone."""
+        for number in range(_ROUNDS):
+            wanted, weights = np.zeros(joints.shape), np.zeros(joints.shape[:3])
+            if others:
+                wanted, weights = _wanted(crowd, touching.at(joints), passing)
+                wanted *= passing.share[..., None, None]
+            if floor is not None:
+                goals, matters = wanted[items], weights[items]
+                height = floor.clearance(items[0], joints[items])
+                lacking = np.maximum(crowd.radii[items[1]] - height, 0.0)
+                lacking *= passing.above[items][:, None]
+                _rise(crowd.radii[items[1]], lacking, goals, matters, crowd.up[items[0]])
+                wanted[items], weights[items] = goals, matters
+            if not np.any(wanted):
+                return number > 0
+            goals, matters = (_GAIN * blurred(each, width)[items] for each in (wanted, weights))
+            joints[items] = rod.bent(goals[:, 1:], np.minimum(matters[:, 1:], 1.0))
+        return True
+
+    if not led(others=True):
+        return None
+    back = _taken_back(crowd.joints, joints, passing, haste)
+    if back.any():
+        joints[items] = rod.taken_back(back[items])
+        led(others=False)
+    return joints
+
+
+def _taken_back(before: Floats, after: Floats, passing: Passing, haste: Haste) -> Floats:
+    """How far (frames, arms) arms are to go where they did before, joints (frames, arms, joints,
+    3), and not where they are led, so that none is flung there, 0…1.
+    """
+    before, after = _directions(before), _directions(after)
+    most = haste.most * (2.0 - np.maximum(passing.holds[1:], passing.holds[:-1]))
+    limits = np.maximum(_turned(before), most)
+    back, led = np.zeros(passing.share.shape), after
+    for _ in range(_TAKEN_BACK):
+        flung = np.minimum(_turned(led) / limits - 1.0, 1.0)
+        if not np.any(flung > 0.0):
             break
-        moved = True
-        goals, matters = (_GAIN * blurred(each, width)[items] for each in (wanted, weights))
-        joints[items] = rod.bent(goals[:, 1:], np.minimum(matters[:, 1:], 1.0))
-    return joints if moved else None
+        flung = np.where(flung > 0.0, _LEAST_BACK + (1.0 - _LEAST_BACK) * flung, 0.0)
+        wanted = np.zeros_like(back)
+        wanted[1:] = flung
+        wanted[:-1] = np.maximum(wanted[:-1], flung)
+        back += (1.0 - back) * covered(wanted, haste.gently)
+        led = _unit(after + back[..., None, None] * (before - after))
+    return back
+
+
+def _turned(directions: Floats) -> Floats:
+    """Radians (frames − 1, arms) that the segment turns that turns most, from directions (frames,
+    arms, segments, 3).
+    """
+    steps = np.linalg.norm(directions[1:] - directions[:-1], axis=-1).max(axis=-1)
+    return 2.0 * np.arcsin(np.minimum(0.5 * steps, 1.0))
+
+
+def _directions(joints: Floats) -> Floats:
+    return _unit(np.diff(joints, axis=-2))
+
+
+def _unit(vectors: Floats) -> Floats:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _TINY)
 
 
 @dataclass(eq=False)
@@ -104,8 +170,10 @@ class _Rods:
     """(items, 3)"""
     lengths: Floats
     """(items, segments)"""
+    before: Floats
+    """(items, segments, 3) unit, as they were …"""
     directions: Floats
-    """(items, segments, 3) unit."""
+    """… and as they are."""
     free: Floats
     """(items, segments) 0…1."""
     holds: Floats
@@ -123,10 +191,12 @@ class _Rods:
         lengths = np.linalg.norm(steps, axis=2)
         anchor, holds = passing.anchors[items], passing.holds[items]
         beyond = np.arange(lengths.shape[1]) >= anchor[:, None]
+        directions = steps / np.maximum(lengths, _TINY)[..., None]
         return cls(
             joints[:, 0],
             lengths,
-            steps / np.maximum(lengths, _TINY)[..., None],
+            directions,
+            directions,
             1.0 - beyond * holds[:, None],
             holds,
             anchor,
@@ -149,6 +219,13 @@ class _Rods:
         self._draw_back()
         return joints_of(self.roots, self.directions, self.lengths)
 
+    def taken_back(self, share: Floats) -> Floats:
+        """Joints (items, segments + 1, 3) as they were by some share (items,)."""
+        way = self.before - self.directions
+        self.directions = _unit(self.directions + share[:, None, None] * way)
+        self._draw_back()
+        return joints_of(self.roots, self.directions, self.lengths)
+
     def _draw_back(self) -> None:
         """Let those that hold something hold it where they did."""
         some = np.flatnonzero(self.holds > 0.0)
@@ -168,9 +245,7 @@ class _Rods:
             goal=np.ascontiguousarray(goal.T),
             steps=_STEPS,
         )
-        back = np.moveaxis(back, -1, 0)
-        size = np.linalg.norm(back, axis=2, keepdims=True)
-        self.directions[some] = back / np.maximum(size, _TINY)
+        self.directions[some] = _unit(np.moveaxis(back, -1, 0))
 
 
 def _wanted(crowd: Crowd, touches: Touches, passing: Passing) -> tuple[Floats, Floats]:

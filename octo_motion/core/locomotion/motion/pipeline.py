@@ -21,6 +21,7 @@ from ..body import BodyMoments, OrganPoses, carriages, pose_organs
 from ..clearance import (
     ArmsOverGround,
     BodyVolume,
+    Haste,
     Opened,
     keep_off_ground,
     lead_past,
@@ -697,6 +698,10 @@ def _led_past(
             ground=ground,
             scale=scale,
             frames_per_cycle=plan.stride * plan.pace.mean,
+            haste=Haste(
+                fastest_turn(plan.stride * job.timing.rate, np.inf),
+                max(1, round(_GENTLY * plan.stride * job.timing.rate)),
+            ),
         )
         arms.rotations = past if past is not None else arms.rotations
     if ground is not None and job.reaching is not None:

@@ -64,10 +64,10 @@ _LEAST_HELD: Final = 0.1
 _TWISTED: Final = 0.8
 """The twist that brings suckers to the object lies in this last share of the free part."""
 _LIFT: Final = 0.25
-_HEAP: Final = (0.7, 0.2)
+_HEAP: Final = (0.9, 0.3)
 """Shares of the free part's length that its way has, from which on it begins to make a knee, and at
 which it does nothing else."""
-_KNEE: Final = np.array([1.5, 0.75, 0.75, 0.5])
+_KNEE: Final = np.array([1.2, 1.2, 0.4, 0.5])
 """Which way a knee goes, in lengths of the free part: out from the body and back again, up and down
 again, and midway down and to the side where the object is."""
 _CLEAR: Final = 0.85
