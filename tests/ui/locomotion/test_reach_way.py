@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
+from octo_motion.ui.locomotion.writing import shot as workflow
 from tests.core import objects
 from tests.referee.creature_measures import angles_between, arm_length, pop, skin_through_skin
 from tests.referee.recording import Recording, moments, record, show
@@ -163,6 +164,10 @@ def beside_the_way(settings: Any, off: float, size: float) -> Any:
         ("crawl", "bumps", "TOUCH", -0.5),
         ("crawl", "slope", "COIL", 0.5),
         ("walk", "stairs", "MOUTH", 0.6),
+        # The body comes to stand close by: much of the arm is too long.
+        ("walk", "bumps", "COIL", 0.35),
+        ("crawl", "plane", "MOUTH", 0.6),
+        ("crawl", "plane", "TOUCH", 0.4),
     ],
 )
 def test_an_arm_that_reaches_from_a_walk_snaps_nowhere_and_stays_over_the_ground(
@@ -196,3 +201,35 @@ def test_an_arm_that_reaches_from_a_walk_snaps_nowhere_and_stays_over_the_ground
     sunk = float((heights - played.tails[:, chain, 2]).max()) / length
     assert turns.max() <= 30.0
     assert sunk <= 0.005
+
+
+def test_an_arm_lets_go_of_what_a_walk_leaves_behind_and_says_so() -> None:
+    things: list[Any] = []
+
+    def change(settings: Any) -> None:
+        things.append(beside_the_way(settings, 0.5, 0.08))
+        click("generate_locomotion")
+        start, end = settings.result.frame_range
+        bpy.context.scene.frame_set(round(0.5 * (start + end)))
+        click("reach_add", target=things[0].name, mode="COIL")
+        settings.reaches[0].frame_release += 24
+
+    scene = build("walk", "plane", change=change)
+    settings = scene.armature.octo_motion.locomotion
+    (reach,) = settings.reaches
+    summary = workflow.generate_locomotion(scene.armature, bpy.context)
+    (told,) = [each for each in summary.notes if "lets go" in each]
+    lets_go = int(told.split(" frame ")[1].split(",")[0])
+    assert reach.frame_contact + reach.coil_frames <= lets_go < reach.frame_release
+    played = record(scene.armature, moments(scene.start, scene.end), with_skin=False)
+    place, count = np.array(things[0].matrix_world.translation), lets_go - scene.start
+    away = {
+        arm[0]: np.linalg.norm(played.heads[:, played.chain(arm)] - place, axis=2).min(axis=1)
+        for arm in scene.arms
+    }
+    own = min(away, key=lambda name: away[name][count])
+    size = 0.08 * unit_of(scene.armature)
+    # It holds until then, and is gone soon after; nothing snaps.
+    assert away[own][count - 5 : count].max() < 2.0 * size
+    assert away[own][count + reach.back_frames] > 4.0 * size
+    assert largest_turn(played) <= 30.0

@@ -67,6 +67,8 @@ _LIFT: Final = 0.25
 _HEAP: Final = (0.9, 0.3)
 """Shares of the free part's length that its way has, from which on it begins to make a knee, and at
 which it does nothing else."""
+_KEEPS: Final = (0.9, 0.7)
+"""The same, from which on it keeps to the shape that it has as it is brought to its end."""
 _KNEE: Final = np.array([1.2, 1.2, 0.4, 0.5])
 """Which way a knee goes, in lengths of the free part: out from the body and back again, up and down
 again, and midway down and to the side where the object is."""
@@ -90,6 +92,8 @@ _MOST_AT_ONCE: Final = 0.5
 """… and radians that a bone turns in one of them, at most."""
 _STIFF: Final = 1e-4
 """What a straight arm yields to a pull along it, for the pull to be of some size."""
+_IN_TIME: Final = 0.25
+"""Share of its way back by which an arm lets go before an object is out of reach."""
 _CLOSING: Final = 20
 """Steps of Newton's method: an arm that is close to what it holds is folded up a lot."""
 _PACINGS: Final = 3
@@ -366,6 +370,7 @@ def plan_grasp(
     turns: float = 2.0,
     up: Floats = _UP,
     name: str = phrase("The arm"),
+    lets_go: bool = True,
 ) -> Grasp:
     """Decide which stretch of the arm takes hold, and where.
 
@@ -379,10 +384,11 @@ def plan_grasp(
         turns: at most so many.
         up: (3,) away from the ground, armature space.
         name: what errors call the arm.
+        lets_go: whether it may let go before it is asked to: when the object gets out of reach.
 
     Raises:
-        SettingsError: the motion does not last from the touch to the release; the object is out
-            of reach at a frame between the two, which is named.
+        SettingsError: the motion does not last until the touch; the object is out of reach at a
+            frame at which the arm has to be at it, which is named.
         RigError: the object has no size, or the arm starts within it.
     """
     held = (times >= timeline.contact - 1e-6) & (times <= timeline.release + 1e-6)
@@ -399,21 +405,39 @@ def plan_grasp(
             ),
             "Change the frames of the reach, or make the motion longer.",
         )
-    profile, places = target.profile, target.places
+    held = np.flatnonzero(held)
     wanted = TOUCH_TURNS if mode == "TOUCH" else turns
-    holding = places[held]
-    skins = Skins.of(profile, radii)
-    plans: list[tuple[float, Grasp]] = []
-    for sense in (1, -1):
-        coil = _coil(arm, skins, holding, Winding(wanted, sense))
-        if isinstance(coil, Coil):
-            loose = Grasp(arm, radii, profile, timeline, mode, coil, 0.0, up, mode == "COIL")
+    skins = Skins.of(target.profile, radii)
+
+    def planned(count: int) -> Grasp | None:
+        """How the arm holds on at so many of the frames, none if it is too short."""
+        holding = target.places[held[:count]]
+        plans: list[tuple[float, Grasp]] = []
+        for sense in (1, -1):
+            coil = _coil(arm, skins, holding, Winding(wanted, sense))
+            if coil is None:
+                continue
+            loose = Grasp(
+                *(arm, radii, target.profile, timeline, mode, coil, 0.0, up), wraps=mode == "COIL"
+            )
             twist = float(_twist_without(arm, loose.holding(holding[:1])[0], coil.first))
             # Suckers come to the object with as little twist as can be.
             plans.append((abs(twist) - 1e-3 * sense, replace(loose, twist=twist)))
-    if not plans:
-        raise _too_far(arm, target, times[held], holding, name)
-    return min(plans, key=itemgetter(0))[1]
+        return min(plans, key=itemgetter(0))[1] if plans else None
+
+    if (grasp := planned(len(held))) is not None:
+        return grasp
+    least = max(int(np.searchsorted(times[held], timeline.closed + 1e-6)), 1)
+    if not lets_go or planned(least) is None:
+        some = held if not lets_go else held[:least]
+        raise _too_far(arm, target, times[some], target.places[some], name)
+    count = _first_true(lambda each: planned(each) is None, least, len(held)) - 1
+    grasp = planned(count)
+    assert grasp is not None
+    back = timeline.end - timeline.release
+    # Not before it lets go is it stretched out.
+    release = max(timeline.closed, float(times[held[count - 1]]) - _IN_TIME * back)
+    return replace(grasp, timeline=replace(timeline, release=release, end=release + back))
 
 
 def _coil(arm: ArmFrames, skins: Skins, places: Places, winding: Winding) -> Coil | None:
@@ -516,19 +540,19 @@ def _approach(
         + (3.0 * u * u - 2.0 * u) * arrives
         + 3.0 * bowed * far * (1.0 - 2.0 * u) * bow
     )
-    # Not in one plane: so no bone's way comes to nothing, and turns over as the goal passes.
+    # Much too long, it would lie in a heap, and which way that leads is not to be told. Not in one
+    # plane: so no bone's way comes to nothing, and turns over as the goal passes.
     out, rises, falls, leans = _KNEE
     knee = (1.0 - 2.0 * u) * (out * outward + rises * up)
     knee = knee + 6.0 * u * (1.0 - u) * (leans * aside - falls * up)
-    heap = _heaped(far / ends[-1])
+    heap = _below(far / ends[-1], _HEAP)
     return np.moveaxis(normalized(shape / ends[-1] + heap * knee), 1, -1)
 
 
-def _heaped(share: Floats) -> Floats:
-    """How far (…) an arm makes a knee whose way has some share (…) of its length, 0…1: much too
-    long, it would lie in a heap, and which way that leads is not to be told.
-    """
-    return smooth_step((_HEAP[0] - share) / (_HEAP[0] - _HEAP[1]))
+def _below(share: Floats, limits: tuple[float, float]) -> Floats:
+    """How far (…) shares are below two limits: from the first on a little, at the second wholly."""
+    high, low = limits
+    return smooth_step((high - share) / (high - low))
 
 
 def _ended_at(goal: Floats, directions: Floats, lengths: Floats) -> Floats:
@@ -540,7 +564,7 @@ def _ended_at(goal: Floats, directions: Floats, lengths: Floats) -> Floats:
     method.
     """
     ended = close_group(directions, lengths, goal, _CLOSING)
-    knee = _heaped(np.linalg.norm(goal, axis=0) / lengths.sum())
+    knee = _below(np.linalg.norm(goal, axis=0) / lengths.sum(), _KEEPS)
     heaps = np.flatnonzero(knee > 0.0)
     if len(heaps) == 0:
         return ended
@@ -557,7 +581,7 @@ def _ended_at(goal: Floats, directions: Floats, lengths: Floats) -> Floats:
         most = np.linalg.norm(turn, axis=1).max(axis=0)
         near += turn * np.minimum(1.0, _MOST_AT_ONCE / np.maximum(most, _MOST_AT_ONCE))
         near /= np.linalg.norm(near, axis=1, keepdims=True)
-    ended[..., heaps] = close_group(near, lengths, goal, _CLOSING)
+    ended[..., heaps] = near
     return ended
 
 
@@ -770,6 +794,7 @@ class Reaching:
             turns=reach.turns,
             up=self.up,
             name=f"'{self.arms[number].name}'",
+            lets_go=not reach.carry,
         )
 
     def arm_of(self, reach: Reach, times: Floats, places: Places) -> int:
@@ -849,19 +874,34 @@ class _Work:
             profile = reach.profile.scaled(1.0 / self.travelling.scale)
             target = Target(profile, places, f"'{reach.target}'")
             grasp = reaching.grasp(reach, number, target, times).paced(times, places, own)
+            self._note(reach, number, grasp)
             moved, progress = grasp.apply(times, places, own), grasp.progress(times)
             self.held[number][:, grasp.coil.first :] += progress.holds[:, None]
-            if reach.mode != "TOUCH":
-                self.notes.append(
-                    phrase(
-                        "'{arm}' winds {turns:.1f} times round '{target}'.",
-                        arm=reaching.arms[number].name,
-                        turns=grasp.turns,
-                        target=reach.target,
-                    )
-                )
         self.rotations[:, columns] = moved
         self._leaves(reach, number, progress)
+
+    def _note(self, reach: Reach, number: int, grasp: Grasp) -> None:
+        """Say what an arm does."""
+        arm, release = self.reaching.arms[number].name, grasp.timeline.release
+        if reach.mode != "TOUCH":
+            self.notes.append(
+                phrase(
+                    "'{arm}' winds {turns:.1f} times round '{target}'.",
+                    arm=arm,
+                    turns=grasp.turns,
+                    target=reach.target,
+                )
+            )
+        if release < reach.timeline.release:
+            self.notes.append(
+                phrase(
+                    "'{arm}' lets go of '{target}' at frame {release:.0f}, before that is out of "
+                    "reach.",
+                    arm=arm,
+                    target=reach.target,
+                    release=release,
+                )
+            )
 
     def _columns(self, number: int) -> slice:
         """Which of all bones are those of an arm."""

@@ -249,11 +249,53 @@ def test_a_touch_leaves_the_tip_free() -> None:
     assert reaching.grasp.turns < 0.3
 
 
-def test_an_object_that_is_carried_out_of_reach_is_told_with_its_frame() -> None:
+@pytest.mark.parametrize("mode", ["COIL", "TOUCH"])
+@pytest.mark.parametrize("joints", [7, 12, 30])
+@pytest.mark.parametrize("past", [(-0.1, 0.15, -0.15), (0.05, 0.0, -0.2), (0.2, -0.05, 0.0)])
+def test_an_arm_much_too_long_does_not_turn_over_as_what_it_holds_passes_its_root(
+    joints: int, mode: Mode, past: tuple[float, float, float]
+) -> None:
+    ends = case(joints).arm.root + np.array(past)
+
+    def passing(times: Floats) -> Places:
+        share = least_jerk((times - 45.0) / 35.0)[:, None]
+        return Places(WHERE + share * (ends - WHERE), still(times).rotations)
+
+    reaching, largest = case(joints, places=passing(frames()), mode=mode), []
+    for step in (0.125, 0.0625):
+        times = frames(step)
+        times = times[(times >= TIMELINE.contact) & (times <= TIMELINE.release)]
+        points = reaching.joints(times, passing(times))
+        along = np.diff(points, axis=1) / reaching.arm.lengths[:, None]
+        largest.append(float(np.linalg.norm(np.diff(along, axis=0), axis=-1).max()))
+        first = reaching.grasp.coil.first
+        there = passing(times).seen(reaching.grasp.coil.joints[0])
+        closed = times >= TIMELINE.closed
+        np.testing.assert_allclose(points[closed, first], there[closed], atol=1e-9)
+    # It turned over between two frames, however near, and was up to 0.6 off.
+    assert largest[1] < 0.6 * largest[0], largest
+
+
+def test_an_object_that_gets_out_of_reach_is_let_go_before() -> None:
     times = frames()
     places = still(times)
     places.positions[70:, 0] += 2.0
-    with pytest.raises(SettingsError, match=r"'Rod' is out of reach of 'Arm 1 L' at frame 70"):
+    reaching = case(places=places)
+    assert 55.0 <= reaching.grasp.timeline.release < 70.0
+    # It takes as long to go back.
+    assert reaching.grasp.timeline.end - reaching.grasp.timeline.release == 30.0
+    # Until then it holds it as one that stays.
+    points, still_there = reaching.joints(times, places), case().joints(times, still(times))
+    first = reaching.grasp.coil.first
+    at = np.searchsorted(times, 58.0)
+    np.testing.assert_allclose(points[at, first:], still_there[at, first:], atol=1e-9)
+
+
+def test_an_object_that_is_carried_out_of_reach_is_told_with_its_frame() -> None:
+    times = frames()
+    places = still(times)
+    places.positions[50:, 0] += 2.0  # before the arm is wound about it
+    with pytest.raises(SettingsError, match=r"'Rod' is out of reach of 'Arm 1 L' at frame 50"):
         case(places=places)
     gone = still(times)
     gone.positions[90:, 0] += 2.0  # after it has been let go
