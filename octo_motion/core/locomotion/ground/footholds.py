@@ -26,7 +26,7 @@ from .arm_curves import laid
 from .contact_timing import ContactTiming
 from .surface import Ground, HeightField, Limbs, StanceSettings, normals, touching
 
-PEELING: Final = 0.5
+PEELING: Final = 0.7
 """Share of a stance in which the arm is peeled off towards its tip, as the body pulls. At 0.2 an
 octopus that walks over bumps slips by 0.0014 arm lengths instead of 0.0005."""
 _SLACK: Final = 0.84

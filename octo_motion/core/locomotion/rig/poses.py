@@ -322,7 +322,7 @@ def _path(skeleton: Skeleton, tip: int, carrying: set[int], same: float) -> tupl
 
 _FASTEST: Final = np.radians(28.0) * 24.0
 """Radians a second that bones may turn in the world …"""
-_IN_A_CYCLE: Final = np.radians(1150.0)
+_IN_A_CYCLE: Final = np.radians(930.0)
 """… and radians in a cycle of the gait, if that is more. On level ground none of the ten set-ups
 comes there. At 1050 Hurry slides over bumps by 3.4 % of an arm of long bones instead of 0.6 %, at
 672 it is 15 % of an arm in bumps instead of 0.4 %; at 1400 Tiptoe turns by 30° in a frame on a
@@ -331,7 +331,7 @@ _WIDEST: Final = 0.34
 """Seconds to either side over which means are taken at most …"""
 _TRIED: Final = (0.125, 0.25, 0.25, 0.5, 0.5, 1.0)
 """… and the shares of that which are taken where the one before was not enough."""
-_TORN: Final = 2.0
+_TORN: Final = 2.5
 """Times that from which on an arm lets go rather than pop: that it holds on is no longer seen."""
 _RESTING: Final = 0.05
 """Seconds before and after a hold in which an arm stays what it is."""
