@@ -37,7 +37,8 @@ from .surface import Ground, Limbs, StanceSettings
 _PEELED_UP: Final = 0.04
 """Arm lengths that an arm is higher where it is peeled off …"""
 _PEELED: Final = 0.15
-"""… so far from where it lies."""
+"""… so far from where it lies. With none of it Walk drags arms over bumps by up to 0.055 arm
+lengths while they seem to rest."""
 _STEPS: Final = (4, 3, 3, 4)
 """Newton's steps each time that an arm is drawn to its foothold, after it was raised. With half as
 many arms miss it by 0.00001."""
