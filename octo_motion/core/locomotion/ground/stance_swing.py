@@ -34,11 +34,6 @@ from .arm_curves import bent, curve, drawn, evened, lerp_bends, raise_over_groun
 from .footholds import PEELING, UNROLLING, Footholds
 from .surface import Ground, Limbs, StanceSettings
 
-_PEELED_UP: Final = 0.04
-"""Arm lengths that an arm is higher where it is peeled off …"""
-_PEELED: Final = 0.15
-"""… so far from where it lies. With none of it Walk drags arms over bumps by up to 0.055 arm
-lengths while they seem to rest."""
 _STEPS: Final = (4, 3, 3, 4)
 """Newton's steps each time that an arm is drawn to its foothold, after it was raised. With half as
 many arms miss it by 0.00001."""
@@ -166,8 +161,6 @@ class Stance:
     """(batch,) metres along the arm from which on it lies on the ground …"""
     contact_to: Floats
     """(batch,) … and up to which."""
-    gone: Floats
-    """(batch,) how much of what is to be peeled off is, 0…1."""
     by_tip: np.ndarray
     """(batch,) whether it is the tip that the ground holds, or the joint that touches first."""
     joints: Floats
@@ -238,7 +231,6 @@ def stance_at(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Flo
         weight=weight * footholds.present[at],
         contact_from=touching + gone * (footholds.peeled_to[at] - touching),
         contact_to=touching + down * (whole - touching),
-        gone=gone,
         by_tip=since > footholds.middle[at],
         joints=np.ascontiguousarray(joints),
         carried=carried,
@@ -370,7 +362,7 @@ def _drawn_to_foothold(
     short = (over - _REST * np.tanh(over / _REST)) / np.maximum(ratio, _TINY)
     goal = stance.carried + stance.place - short * chord
     to_goal = _to_goal(batch, stance)
-    needed = room_needed(batch.radii, batch.reach[-1], batch.lift) + _peeled_up(batch, stance)
+    needed = room_needed(batch.radii, batch.reach[-1], batch.lift)
     soft = _SOFT * np.max(batch.radii, axis=0) + _TINY
     room = JointRoom(needed, _loose(batch, stance), soft)
     before = shares_before(batch.limbs.weights[:, 0])[:, None]
@@ -391,19 +383,6 @@ def _drawn_to_foothold(
         )
         yield
     return own
-
-
-def _peeled_up(batch: Batch, stance: Stance) -> Floats:
-    """Metres (segments + 1, batch) that joints are to be higher which have lain, or nearly so: what
-    is peeled off is pulled on, and must not be dragged along the ground.
-    """
-    reach, width = batch.reach, _PEELED * batch.reach[-1]
-    return (
-        _PEELED_UP
-        * batch.reach[-1]
-        * stance.gone
-        * smooth_step((stance.contact_from - reach) / width)
-    )
 
 
 def _laid_on_ground(

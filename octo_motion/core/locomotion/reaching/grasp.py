@@ -393,51 +393,49 @@ def plan_grasp(
     """
     held = (times >= timeline.contact - 1e-6) & (times <= timeline.release + 1e-6)
     if not np.any(held):
-        raise SettingsError(
-            phrase(
-                "{name} would touch {target} at frame {contact:g}, outside of the motion, which "
-                "lasts from frame {first:g} to {last:g}.",
-                name=name,
-                target=target.name,
-                contact=timeline.contact,
-                first=times[0],
-                last=times[-1],
-            ),
-            "Change the frames of the reach, or make the motion longer.",
-        )
-    held = np.flatnonzero(held)
-    wanted = TOUCH_TURNS if mode == "TOUCH" else turns
+        raise _outside(target, timeline, times, name)
+    times, places = times[held], target.places[held]
     skins = Skins.of(target.profile, radii)
+    wanted = TOUCH_TURNS if mode == "TOUCH" else turns
 
-    def planned(count: int) -> Grasp | None:
+    def holding(count: int) -> Grasp | None:
         """How the arm holds on at so many of the frames, none if it is too short."""
-        holding = target.places[held[:count]]
         plans: list[tuple[float, Grasp]] = []
         for sense in (1, -1):
-            coil = _coil(arm, skins, holding, Winding(wanted, sense))
+            coil = _coil(arm, skins, places[:count], Winding(wanted, sense))
             if coil is None:
                 continue
-            loose = Grasp(
+            grasp = Grasp(
                 *(arm, radii, target.profile, timeline, mode, coil, 0.0, up), wraps=mode == "COIL"
             )
-            twist = float(_twist_without(arm, loose.holding(holding[:1])[0], coil.first))
+            twist = float(_twist_without(arm, grasp.holding(places[:1])[0], coil.first))
             # Suckers come to the object with as little twist as can be.
-            plans.append((abs(twist) - 1e-3 * sense, replace(loose, twist=twist)))
+            plans.append((abs(twist) - 1e-3 * sense, replace(grasp, twist=twist)))
         return min(plans, key=itemgetter(0))[1] if plans else None
 
-    if (grasp := planned(len(held))) is not None:
-        return grasp
-    least = max(int(np.searchsorted(times[held], timeline.closed + 1e-6)), 1)
-    if not lets_go or planned(least) is None:
-        some = held if not lets_go else held[:least]
-        raise _too_far(arm, target, times[some], target.places[some], name)
-    count = _first_true(lambda each: planned(each) is None, least, len(held)) - 1
-    grasp = planned(count)
+    found, count = holding(len(times)), len(times)
+    if found is None and lets_go:
+        found, count = _letting_go(holding, timeline, times)
+    if found is None:
+        raise _too_far(arm, target, times[:count], places[:count], name)
+    return found
+
+
+def _letting_go(
+    holding: Callable[[int], Grasp | None], timeline: Timeline, times: Floats
+) -> tuple[Grasp | None, int]:
+    """A grasp that lasts as long as the object is in reach, of its times (frames,), by how an arm
+    holds on at so many of them; none where that is not until it is wound. And how many they are.
+    """
+    least = max(int(np.searchsorted(times, timeline.closed + 1e-6)), 1)
+    if holding(least) is None:
+        return None, least
+    count = _first_true(lambda each: holding(each) is None, least, len(times)) - 1
+    grasp, back = holding(count), timeline.end - timeline.release
     assert grasp is not None
-    back = timeline.end - timeline.release
     # Not before it lets go is it stretched out.
-    release = max(timeline.closed, float(times[held[count - 1]]) - _IN_TIME * back)
-    return replace(grasp, timeline=replace(timeline, release=release, end=release + back))
+    release = max(timeline.closed, float(times[count - 1]) - _IN_TIME * back)
+    return replace(grasp, timeline=replace(timeline, release=release, end=release + back)), count
 
 
 def _coil(arm: ArmFrames, skins: Skins, places: Places, winding: Winding) -> Coil | None:
@@ -491,6 +489,22 @@ def _first_true(test: Callable[[int], bool], low: int, high: int) -> int:
         else:
             low = middle + 1
     return low
+
+
+def _outside(target: Target, timeline: Timeline, times: Floats, name: str) -> SettingsError:
+    """What to say of an object that would be touched when there is no motion."""
+    return SettingsError(
+        phrase(
+            "{name} would touch {target} at frame {contact:g}, outside of the motion, which "
+            "lasts from frame {first:g} to {last:g}.",
+            name=name,
+            target=target.name,
+            contact=timeline.contact,
+            first=times[0],
+            last=times[-1],
+        ),
+        "Change the frames of the reach, or make the motion longer.",
+    )
 
 
 def _too_far(

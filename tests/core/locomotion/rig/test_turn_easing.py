@@ -87,7 +87,7 @@ def test_an_arm_that_holds_on_lets_go_only_of_what_would_pop() -> None:
 
 def test_a_gait_in_a_hurry_may_turn_faster() -> None:
     arms = arms_of()
-    rotations = flipping(np.radians(40.0), 120, len(arms), len(arms[0].bones), 3)
+    rotations = flipping(np.radians(36.0), 120, len(arms), len(arms[0].bones), 3)
     free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
     assert (
         eased_turns(arms, rotations, STILL, free, rate=24.0, limits=turn_limits(24.0, 24.0)) is None
@@ -101,7 +101,7 @@ def test_a_gait_in_a_hurry_may_turn_faster() -> None:
 def test_an_arm_that_reaches_takes_its_time_in_a_hurry_too() -> None:
     arms = arms_of()
     bones = len(arms[0].bones)
-    rotations = flipping(np.radians(40.0), 120, len(arms), bones, 3)
+    rotations = flipping(np.radians(36.0), 120, len(arms), bones, 3)
     rotations[180:, bones + 3] = rotations[120, 3]
     free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
     reaching = np.zeros((FRAMES, len(arms)), dtype=bool)
