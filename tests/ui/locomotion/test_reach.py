@@ -339,6 +339,10 @@ def test_errors_say_what_to_do_and_change_nothing(octopus: Any) -> None:
     rod.location.x = 5.0
     bpy.context.view_layer.update()
     assert "'Rod' is out of reach of 'Arm 1 L' at frame" in told()
+    # What is to be brought is called by its name, too.
+    item.mode = "MOUTH"
+    assert "'Rod' is out of reach of 'Arm 1 L' at frame" in told()
+    item.mode = "COIL"
     rod.location.x = 0.55
     item.frame_contact = item.frame_start + 200
     item.frame_release = 300

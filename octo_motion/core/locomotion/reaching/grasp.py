@@ -64,10 +64,10 @@ _LEAST_HELD: Final = 0.1
 _TWISTED: Final = 0.8
 """The twist that brings suckers to the object lies in this last share of the free part."""
 _LIFT: Final = 0.25
-_HEAP: Final = (0.9, 0.3)
+_HEAP: Final = (0.85, 0.3)
 """Shares of the free part's length that its way has, from which on it begins to make a knee, and at
 which it does nothing else."""
-_KEEPS: Final = (0.9, 0.7)
+_KEEPS: Final = (0.85, 0.65)
 """The same, from which on it keeps to the shape that it has as it is brought to its end."""
 _KNEE: Final = np.array([1.2, 1.2, 0.4, 0.5])
 """Which way a knee goes, in lengths of the free part: out from the body and back again, up and down
@@ -1008,7 +1008,8 @@ class _Work:
         known = self._as_at_rest(number, seen)
         evenly = places(np.linspace(0.0, 1.0, len(held)))
         known.positions[held], known.rotations[held] = evenly.positions, evenly.rotations
-        grasp = self.reaching.grasp(reach, number, Target(profile, known), self.times)
+        target = Target(profile, known, f"'{reach.target}'")
+        grasp = self.reaching.grasp(reach, number, target, self.times)
         took = max(reach.brought - closed, 1e-6)
         way = (self.times[held] - closed) / took
         share = unhurried(way, lambda each: grasp.holding(places(each)))
