@@ -189,7 +189,8 @@ class _Rods:
         joints = crowd.joints[items]
         steps = np.diff(joints, axis=1)
         lengths = np.linalg.norm(steps, axis=2)
-        anchor, holds = passing.anchors[items], passing.holds[items]
+        # Ways from 0 to 1 may be beyond in the last digit.
+        anchor, holds = passing.anchors[items], np.clip(passing.holds[items], 0.0, 1.0)
         beyond = np.arange(lengths.shape[1]) >= anchor[:, None]
         directions = steps / np.maximum(lengths, _TINY)[..., None]
         return cls(
