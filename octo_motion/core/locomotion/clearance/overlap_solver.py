@@ -75,7 +75,7 @@ def turned_towards(
     most = _length(turn).max(axis=1)[:, None, None]
     result = directions + turn / np.sqrt(1.0 + (most / _BOLD) ** 2)
     turns = (free > 0.0) & (lengths > 0.0)
-    return np.where(turns[..., None], _unit(result), directions)
+    return np.where(turns[..., None], unit(result), directions)
 
 
 def _sums_beyond(values: Floats) -> Floats:
@@ -466,7 +466,7 @@ class _Parting:
         torn = np.clip(missed / (_TORN * self._length) - 1.0, 0.0, 1.0)[:, None, None]
         back = np.where(torn > 0.0, back + torn * (self._before[items] - back), back)
         result = directions.copy()
-        result[some] = _unit(back)
+        result[some] = unit(back)
         return result
 
     def _put(self, chosen: tuple[np.ndarray, ...], directions: Floats) -> None:
@@ -512,7 +512,7 @@ class _Parting:
         def give_up(chosen: tuple[np.ndarray, ...]) -> None:
             back = share[chosen][:, None, None]
             before, after = self._before[chosen], self._directions[chosen]
-            mixed = _unit(after + back * (before - after))
+            mixed = unit(after + back * (before - after))
             mixed = np.where(back >= 1.0 - 1e-9, before, self._drawn_back(chosen, mixed))
             self._put(chosen, mixed)
 
@@ -548,7 +548,7 @@ def _within(before: Floats, after: Floats, free: Floats) -> Floats:
     away = after - before
     allowed = _AWAY * free / np.maximum(1.0 - free, _TINY)
     share = 1.0 / np.sqrt(1.0 + (_length(away) / np.maximum(allowed, _TINY)) ** 2)
-    return _unit(before + share[..., None] * away)
+    return unit(before + share[..., None] * away)
 
 
 def _beyond(shares: Floats) -> Floats:
@@ -613,5 +613,6 @@ def _length(vectors: Floats) -> Floats:
     return np.sqrt(x * x + y * y + z * z)
 
 
-def _unit(vectors: Floats) -> Floats:
+def unit(vectors: Floats) -> Floats:
+    """Vectors (…, 3) of length 1; those of none stay so."""
     return vectors / np.maximum(_length(vectors), _TINY)[..., None]

@@ -24,7 +24,7 @@ from ...smoothing import blurred, covered, smooth_step
 from ...steps import finished
 from ..ground import drawn
 from .capsule_overlap import Capsules, Crowd, Touches, Touching
-from .overlap_solver import Floor, joints_of, turned_towards
+from .overlap_solver import Floor, joints_of, turned_towards, unit
 
 _ROUNDS: Final = 32
 _GAIN: Final = 2.0
@@ -142,7 +142,7 @@ def _taken_back(before: Floats, after: Floats, passing: Passing, haste: Haste) -
         wanted[1:] = flung
         wanted[:-1] = np.maximum(wanted[:-1], flung)
         back += (1.0 - back) * covered(wanted, haste.gently)
-        led = _unit(after + back[..., None, None] * (before - after))
+        led = unit(after + back[..., None, None] * (before - after))
     return back
 
 
@@ -155,11 +155,7 @@ def _turned(directions: Floats) -> Floats:
 
 
 def _directions(joints: Floats) -> Floats:
-    return _unit(np.diff(joints, axis=-2))
-
-
-def _unit(vectors: Floats) -> Floats:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _TINY)
+    return unit(np.diff(joints, axis=-2))
 
 
 @dataclass(eq=False)
@@ -187,12 +183,11 @@ class _Rods:
     def of(cls, crowd: Crowd, passing: Passing, items: tuple[np.ndarray, ...]) -> _Rods:
         """The arms of a crowd at some frames."""
         joints = crowd.joints[items]
-        steps = np.diff(joints, axis=1)
-        lengths = np.linalg.norm(steps, axis=2)
+        lengths = np.linalg.norm(np.diff(joints, axis=1), axis=2)
         # Ways from 0 to 1 may be beyond in the last digit.
         anchor, holds = passing.anchors[items], np.clip(passing.holds[items], 0.0, 1.0)
         beyond = np.arange(lengths.shape[1]) >= anchor[:, None]
-        directions = steps / np.maximum(lengths, _TINY)[..., None]
+        directions = _directions(joints)
         return cls(
             joints[:, 0],
             lengths,
@@ -223,7 +218,7 @@ class _Rods:
     def taken_back(self, share: Floats) -> Floats:
         """Joints (items, segments + 1, 3) as they were by some share (items,)."""
         way = self.before - self.directions
-        self.directions = _unit(self.directions + share[:, None, None] * way)
+        self.directions = unit(self.directions + share[:, None, None] * way)
         self._draw_back()
         return joints_of(self.roots, self.directions, self.lengths)
 
@@ -246,7 +241,7 @@ class _Rods:
             goal=np.ascontiguousarray(goal.T),
             steps=_STEPS,
         )
-        self.directions[some] = _unit(np.moveaxis(back, -1, 0))
+        self.directions[some] = unit(np.moveaxis(back, -1, 0))
 
 
 def _wanted(crowd: Crowd, touches: Touches, passing: Passing) -> tuple[Floats, Floats]:
