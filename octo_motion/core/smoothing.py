@@ -29,6 +29,18 @@ def least_jerk(share: Floats) -> Floats:
     return t * t * t * (10.0 + t * (6.0 * t - 15.0))
 
 
+def even_pace(share: Floats, ease: float) -> Floats:
+    """From 0 to 1 at a pace that is the same all the time, but for a share of it at either end, in
+    which it comes and goes evenly: 0 < ``ease`` ≤ 1/2.
+
+    No movement that starts and stops without a jerk has less of a greatest pace: 1 / (1 − ease).
+    """
+    t = np.minimum(np.maximum(share, 0.0), 1.0)
+    coming, going = np.minimum(t, ease), np.maximum(t - (1.0 - ease), 0.0)
+    even = np.maximum(t - ease, 0.0)
+    return (0.5 * coming * coming / ease + even - 0.5 * going * going / ease) / (1.0 - ease)
+
+
 # --- What happens at some frames, spread over those before and after it ---------------------------
 #
 # A value at one frame hangs on the frames round it, the same number to either side, and on nothing

@@ -115,6 +115,10 @@ _STEP: Final = 0.3
 """Arm lengths of a stride below which it rises less: who goes nowhere, does not bob."""
 _PUSHES: Final = 8.0
 """Makes the push of one arm of eight that hold on count 1."""
+_BRIEF: Final = 0.6
+"""Share of what holds usually last below which a push is weaker. Without it Tiptoe's body is thrown
+up over bumps by 0.012 arm lengths in a frame, at 1 arms of Walk are 1.3 radii deep in each other
+there instead of 0.13."""
 _AVERAGE: Final = 0.7
 """Strides over which (standard deviation) what is usual is found."""
 _SHIFTED: Final = 0.012
@@ -239,9 +243,12 @@ def _held(values: Floats, most: float) -> Floats:
 def _pushes(holds: Holds, distance: Floats, loop: float | None) -> tuple[Floats, Floats]:
     """How strongly arms push at distances (n,), and how many hold on there.
 
-    An arm's push rises from nothing and falls to nothing, without a corner.
+    An arm's push rises from nothing and falls to nothing, without a corner. One that holds on
+    briefly moves the body as far as a steady force does in that time: it does not jolt it.
     """
     weights = 1.0 - _BEHIND * 0.5 * (1.0 - holds.behind)
+    lasts = holds.end - holds.start
+    weights = weights * np.minimum(lasts / (_BRIEF * np.median(lasts)), 1.0) ** 2
     every = np.stack([holds.start, holds.end, weights], axis=1)
     if loop is not None:
         # Those of one round, and the same before it and after it.

@@ -494,7 +494,9 @@ class _Parting:
         swift = _beyond(turns / most)
         result[1:] = np.maximum(result[1:], swift)
         result[:-1] = np.maximum(result[:-1], swift)
-        result[self._room.min(axis=2) < -TOLERATED * self._length] = 1.0
+        # By no more than they are too low: where that is a hair, they need not go back at once.
+        sunk = -self._room.min(axis=2) / (TOLERATED * self._length)
+        result = np.maximum(result, smooth_step(sunk - 1.0))
         return np.where(changed | (result < 1.0), result, 0.0)
 
     def _changed(self) -> np.ndarray:

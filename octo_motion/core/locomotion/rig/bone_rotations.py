@@ -324,7 +324,7 @@ class ArmFrames:
         whose bones are longer than at rest by strains (…, bones), as a share.
         """
         lengths = self.lengths if strains is None else self.lengths * (1.0 + strains)
-        steps = lengths[..., None] * rotate(frames, _ALONG)
+        steps = lengths[..., None] * along_segments(frames)
         start = np.broadcast_to(self.root, (*steps.shape[:-2], 1, 3))
         return np.concatenate([start, self.root + np.cumsum(steps, axis=-2)], axis=-2)
 
@@ -359,6 +359,11 @@ def frames_of_arm(skeleton: Skeleton, bones: Sequence[str], body: BodyFrame) -> 
     return ArmFrames(tuple(bones), joints[0], np.linalg.norm(steps, axis=1), rest, own)
 
 
+def along_segments(frames: Floats) -> Floats:
+    """Unit vectors (…, 3) along the segments that frames (…, 4) are of."""
+    return rotate(frames, _ALONG)
+
+
 def frame_of(along: Floats, facing: Floats) -> Floats:
     """Quaternions (…, 4) of frames with x along (…, 3) and y as near to facing (…, 3) as can be."""
     x = normalized(along)
@@ -380,7 +385,7 @@ def transport_frames(directions: Floats, first: Floats) -> Floats:
     before = first
     for segment in range(directions.shape[-2]):
         along = directions[..., segment, :]
-        turn = shortest_arc(rotate(before, _ALONG), along)
+        turn = shortest_arc(along_segments(before), along)
         facing = rotate(turn, rotate(before, _FACING))
         before = frame_of(along, facing)
         result[..., segment, :] = before

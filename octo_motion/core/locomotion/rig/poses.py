@@ -11,11 +11,20 @@ import numpy as np
 
 from ...content_cache import part_of
 from ...keyframes import halfway_values
-from ...rotations import Floats, conjugate, continuous, from_matrix, multiply, normalized, rotate
+from ...rotations import (
+    Floats,
+    conjugate,
+    continuous,
+    from_matrix,
+    multiply,
+    normalized,
+    rotate,
+    shortest_arc,
+)
 from ...skeleton import Skeleton
 from ...smoothing import blurred, covered, spans
 from .arm_chains import BodyFrame, joint_positions
-from .bone_rotations import ArmFrames, arm_rest, rotate_bones, turns_in_world
+from .bone_rotations import ArmFrames, along_segments, arm_rest, rotate_bones, turns_in_world
 
 
 @dataclass(frozen=True, eq=False)
@@ -382,10 +391,10 @@ def eased_turns(
         turning: what :func:`turns_in_world` says of them, if that is known.
 
     Returns:
-        Rotations (moments, bones, 4), and how far each arm was changed (moments, arms), 0…1; none
+        Rotations (moments, bones, 4), and how far each arm was moved (moments, arms), 0…1; none
         where nothing is too fast.
     """
-    result, changed, start = rotations, np.zeros((len(rotations), len(arms))), 0
+    result, moved, start = rotations, np.zeros((len(rotations), len(arms))), 0
     if turning is None:
         turning = turns_in_world(arms, rotations, orientations, every)
     limits = np.broadcast_to(limits, (len(turning), len(arms)))
@@ -397,42 +406,82 @@ def eased_turns(
         before = continuous(multiply(orientations[:, None], arm.from_bones(rotations[:, own])))
         if cyclic and np.any(np.sum(before[-1] * before[0], axis=-1) < 0.0):
             continue
-        frames, share = _eased(
-            before, held[number], most, every=every, rate=every * rate, cyclic=cyclic
-        )
-        if not share.any():
+        taking_time = _TakingTime(most, every, every * rate, cyclic)
+        # What holds on need not let go of what it has only rolled too fast.
+        frames, rolled = taking_time.rolled(before)
+        frames, share = taking_time.eased(frames, held[number])
+        some = np.flatnonzero(np.maximum(share, rolled))
+        if not len(some):
             continue
         if result is rotations:
             result = rotations.copy()
-        some = np.flatnonzero(share)
         turned = multiply(conjugate(orientations[some, None]), frames[some])
         result[some, own] = arm.to_bones(turned)
-        changed[:, number] = share
-    return None if result is rotations else (result, changed)
+        moved[:, number] = share
+    return None if result is rotations else (result, moved)
 
 
-def _eased(
-    before: Floats, held: np.ndarray, most: Floats, *, every: int, rate: float, cyclic: bool
-) -> tuple[Floats, Floats]:
-    """Frames (moments, bones, 4) of an arm, world, with means where it is too fast, and how far
-    these count (moments,).
-    """
-    rests = max(1, round(_RESTING * rate))
-    loose = 1.0 - covered(held.astype(np.float64), rests, cyclic=cyclic)
-    frames, whole = before, np.zeros(len(before))
-    for part in _TRIED:
-        width = max(1, round(part * _WIDEST * rate))
-        near, torn = (
-            covered(_faster(frames, each, every).astype(np.float64), width, cyclic=cyclic)
-            for each in (most, _TORN * most)
-        )
-        share = np.maximum(near * loose, torn)
-        if not share.any():
-            break
-        mean = blurred(frames, width, cyclic=cyclic)
-        frames = normalized(frames + share[:, None, None] * (mean - frames))
-        whole = np.maximum(whole, share)
-    return frames, whole
+@dataclass(frozen=True, eq=False)
+class _TakingTime:
+    """Means over time of frames (moments, bones, 4) of an arm, world, where it is too fast."""
+
+    most: Floats
+    """(moments − every,) radians that bones may turn within a frame."""
+    every: int
+    """At every how many moments there is a frame."""
+    rate: float
+    """Moments a second."""
+    cyclic: bool
+    """Whether the last moment is the first again."""
+
+    def eased(self, before: Floats, held: np.ndarray) -> tuple[Floats, Floats]:
+        """The frames, and how far means count in them (moments,): not while they are held
+        (moments,), but where they would pop.
+        """
+        rests = max(1, round(_RESTING * self.rate))
+        loose = 1.0 - covered(held.astype(np.float64), rests, cyclic=self.cyclic)
+        frames, whole = before, np.zeros(len(before))
+        for part in _TRIED:
+            width, turning = self._width(part), _turns(frames, self.every)
+            near, torn = (self._near(turning > each * self.most, width) for each in (1.0, _TORN))
+            share = np.maximum(near * loose, torn)
+            if not share.any():
+                break
+            frames = self._mean(frames, share, width)
+            whole = np.maximum(whole, share)
+        return frames, whole
+
+    def rolled(self, before: Floats) -> tuple[Floats, Floats]:
+        """The frames, which roll about their segments no faster than they may turn, and how far
+        means count in that (moments,). The segments are where they were: what holds on does so, and
+        may take its time as what is free.
+        """
+        frames, whole = before, np.zeros(len(before))
+        for part in _TRIED:
+            width = self._width(part)
+            share = self._near(_rolls(frames, self.every) > self.most, width)
+            if not share.any():
+                break
+            mean, some = self._mean(frames, share, width), np.flatnonzero(share)
+            back = shortest_arc(along_segments(mean[some]), along_segments(before[some]))
+            frames = frames.copy()
+            frames[some] = multiply(back, mean[some])
+            whole = np.maximum(whole, share)
+        return frames, whole
+
+    def _width(self, part: float) -> int:
+        return max(1, round(part * _WIDEST * self.rate))
+
+    def _near(self, fast: np.ndarray, width: int) -> Floats:
+        """How near (moments,), 0…1, a frame is that is too fast (moments − every,)."""
+        within = np.zeros(len(fast) + self.every, dtype=bool)
+        for step in range(self.every + 1):
+            within[step : step + len(fast)] |= fast
+        return covered(within.astype(np.float64), width, cyclic=self.cyclic)
+
+    def _mean(self, frames: Floats, share: Floats, width: int) -> Floats:
+        mean = blurred(frames, width, cyclic=self.cyclic)
+        return normalized(frames + share[:, None, None] * (mean - frames))
 
 
 def where_it_helps(
@@ -481,17 +530,17 @@ def _goes_round(stretches: list[list[tuple[int, int]]], count: int) -> bool:
     return stretches[0][0][0] == 0 and stretches[-1][0][1] == count
 
 
-def _faster(frames: Floats, most: Floats, every: int) -> np.ndarray:
-    """Moments (moments,) within a frame in which some bone of frames (moments, bones, 4) turns by
-    more than so many radians (moments − every,).
-    """
-    over, result = _turns(frames, every) > most, np.zeros(len(frames), dtype=bool)
-    for step in range(every + 1):
-        result[step : step + len(over)] |= over
-    return result
-
-
 def _turns(frames: Floats, every: int) -> Floats:
     """Radians (moments − every,) that the quickest of the bones turns within a frame."""
     same = np.abs(np.sum(frames[every:] * frames[:-every], axis=-1))
+    return 2.0 * np.arccos(np.minimum(same, 1.0)).max(axis=1, initial=0.0)
+
+
+def _rolls(frames: Floats, every: int) -> Floats:
+    """Radians (moments − every,) that the quickest of the bones rolls about its segment within a
+    frame.
+    """
+    before, after = frames[:-every], frames[every:]
+    swing = shortest_arc(along_segments(before), along_segments(after))
+    same = np.abs(np.sum(multiply(swing, before) * after, axis=-1))
     return 2.0 * np.arccos(np.minimum(same, 1.0)).max(axis=1, initial=0.0)

@@ -8,7 +8,7 @@ import pytest
 
 from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_arm
 from octo_motion.core.locomotion.rig.poses import eased_turns, turn_limits, where_it_helps
-from octo_motion.core.rotations import Floats, from_axis_angle
+from octo_motion.core.rotations import Floats, from_axis_angle, rotate
 from tests.core.rigs import body_with_arms
 
 FRAMES = 240
@@ -83,6 +83,26 @@ def test_an_arm_that_holds_on_lets_go_only_of_what_would_pop() -> None:
     )
     assert found is not None
     assert largest(found[0]) < np.radians(45.0)
+
+
+@pytest.mark.parametrize("rate", [24.0, 96.0])
+@pytest.mark.parametrize("degrees", [50.0, 130.0])
+def test_an_arm_that_holds_on_takes_its_time_to_roll_and_lies_as_it_did(
+    rate: float, degrees: float
+) -> None:
+    arms = arms_of()
+    arm, bones = arms[0], len(arms[0].bones)
+    about = rotate(arm.own[3], np.array([1.0, 0.0, 0.0]))
+    rotations = flipping(0.0, 120, len(arms), bones, 3)
+    rotations[120:, 3] = from_axis_angle(about, np.radians(np.array(degrees)))
+    held = [np.ones(FRAMES, dtype=bool)] * len(arms)
+    found = eased_turns(arms, rotations, STILL, held, rate=rate, limits=turn_limits(rate, SLOWLY))
+    assert found is not None
+    eased, moved = found
+    assert largest(eased) <= 1.001 * FASTEST / rate
+    assert not moved.any()
+    before, after = (arm.joints(arm.from_bones(each[:, :bones])) for each in (rotations, eased))
+    np.testing.assert_allclose(after, before, atol=1e-9 * arm.length)
 
 
 def test_a_gait_in_a_hurry_may_turn_faster() -> None:

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Walks over bumps on ways that nobody chose: they wind as chance has it, as artists' do."""
+
+import random
+
+import numpy as np
+import pytest
+
+from tests.referee import creature_measures as measures
+from tests.referee.recording import moments, record
+from tests.referee.scenes import build
+from tests.referee.surface import Surface
+
+FARTHEST = 1.1136
+"""Metres from the middle to either side, for an arm of 0.58 m."""
+
+
+def winding(seed: int) -> np.ndarray:
+    chance = random.Random(seed)  # noqa: S311 - nothing secret
+    way = [[chance.uniform(-FARTHEST, FARTHEST) for _ in range(2)] for _ in range(4)]
+    return np.pad(np.array(way), ((0, 0), (0, 1)))
+
+
+@pytest.mark.parametrize(
+    ("setup", "seed", "turn", "drift"),
+    [
+        # What a short hold peeled off turned by 41° and 39°: 24° and 28°.
+        ("tiptoe", 6, 30.0, 0.008),
+        ("tiptoe", 3, 30.0, 0.005),
+        # A tip that rolled as it landed turned by 87°: 42°.
+        ("hurry", 8, 48.0, 0.008),
+        # What the body dragged on drifted by 5.5 and 3.8 % of an arm: 0.6 and 0.4 %.
+        ("walk", 9, 30.0, 0.012),
+        ("walk", 8, 30.0, 0.009),
+    ],
+)
+def test_a_winding_way_over_bumps_tears_nothing_and_what_rests_rests(
+    setup: str, seed: int, turn: float, drift: float
+) -> None:
+    scene = build(setup, "bumps", way=winding(seed))
+    played = record(scene.armature, moments(scene.start, scene.end), with_skin=False)
+    length, surface = measures.arm_length(played, scene.arms), Surface.of(scene.ground)
+    assert measures.turns(played).value <= turn
+    assert measures.resting(played, scene.arms, surface, length).drift.value <= drift
