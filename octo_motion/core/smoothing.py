@@ -69,6 +69,31 @@ def blurred(values: Floats, width: int, *, cyclic: bool = False) -> Floats:
     return result
 
 
+def blurred_between(
+    values: Floats, width: int, fixed: np.ndarray, *, cyclic: bool = False
+) -> Floats:
+    """The same, but half as wide as the nearest frame that is fixed (frames,) is away, if that is
+    less: what is fixed stays what it is, and what comes before and after it is as it was at first.
+    """
+    # Those of a loop go on beyond its ends.
+    numbers = np.flatnonzero(_around(fixed, 2 * width, cyclic=cyclic)) - 2 * width
+    frames = np.arange(len(values))
+    near = np.full(len(values), width)
+    if len(numbers):
+        after = np.searchsorted(numbers, frames)
+        ahead = numbers[np.minimum(after, len(numbers) - 1)] - frames
+        behind = frames - numbers[np.maximum(after - 1, 0)]
+        near = np.minimum((np.minimum(np.abs(ahead), np.abs(behind)) + 1) // 2, width)
+    low, high = frames + width - near, frames + width + near + 1
+    many = (2 * near + 1).reshape(-1, *[1] * (values.ndim - 1))
+    result = values
+    for _ in range(_PASSES):
+        around = _around(result, width, cyclic=cyclic)
+        sums = np.concatenate([np.zeros_like(around[:1]), np.cumsum(around, axis=0)])
+        result = (sums[high] - sums[low]) / many
+    return result
+
+
 def widened(values: Floats, frames: int, *, cyclic: bool = False) -> Floats:
     """The greatest value (frames, …) within so many frames to either side."""
     around = _around(values, frames, cyclic=cyclic)
