@@ -126,7 +126,11 @@ by up to 0.055 arm lengths on ten ways of random turns, instead of 0.023 …"""
 _DRAGGED_ALONG: Final = 0.15
 """… arm lengths beyond what lies over which it comes to be …"""
 _DRAGGED_BY: Final = 0.15
-"""… and arm lengths that a body goes meanwhile where all of it comes. In place nothing rises."""
+"""… and arm lengths that a body goes meanwhile where all of it comes. In place nothing rises …"""
+_DRAGGED_OVER: Final = 0.15
+"""… nor on even ground, which an arm leaves by itself: radians between upwards where it lies and on
+the whole from which on all of it comes. On any ground, arms of Walk on a slope touch at 13 % of the
+moments instead of 5 %."""
 _TINY: Final = 1e-12
 
 
@@ -421,7 +425,9 @@ def _laid_on_ground(
 def _dragged_up(batch: Batch, stance: Stance) -> Floats:
     """Metres (segments + 1, batch) that joints rise which the body drags on, beyond what lies."""
     whole, beyond = batch.reach[-1], stance.contact_from - batch.reach
-    dragged = smooth_step(stance.goes / (_DRAGGED_BY * whole))
+    upward = components_first.normalized(np.sum(stance.normals, axis=0))
+    uneven = np.arccos(np.clip(dot(stance.normals, upward).min(axis=0), -1.0, 1.0))
+    dragged = smooth_step(stance.goes / (_DRAGGED_BY * whole)) * smooth_step(uneven / _DRAGGED_OVER)
     return _DRAGGED_UP * whole * dragged * smooth_step(beyond / (_DRAGGED_ALONG * whole))
 
 
