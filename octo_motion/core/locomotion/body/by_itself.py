@@ -248,6 +248,9 @@ def _pushes(holds: Holds, distance: Floats, loop: float | None) -> tuple[Floats,
     """
     weights = 1.0 - _BEHIND * 0.5 * (1.0 - holds.behind)
     lasts = holds.end - holds.start
+    # What the ends of the way cut is no brief hold.
+    inside = (holds.start > distance[0]) & (holds.end < distance[-1])
+    lasts = np.where(inside, lasts, np.median(lasts))
     weights = weights * np.minimum(lasts / (_BRIEF * np.median(lasts)), 1.0) ** 2
     every = np.stack([holds.start, holds.end, weights], axis=1)
     if loop is not None:
