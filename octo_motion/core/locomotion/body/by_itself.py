@@ -248,10 +248,10 @@ def _pushes(holds: Holds, distance: Floats, loop: float | None) -> tuple[Floats,
     """
     weights = 1.0 - _BEHIND * 0.5 * (1.0 - holds.behind)
     lasts = holds.end - holds.start
-    # What the ends of the way cut is no brief hold.
-    inside = (holds.start > distance[0]) & (holds.end < distance[-1])
-    lasts = np.where(inside, lasts, np.median(lasts))
-    weights = weights * np.minimum(lasts / (_BRIEF * np.median(lasts)), 1.0) ** 2
+    brief = np.minimum(lasts / (_BRIEF * np.median(lasts)), 1.0) ** 2
+    # What the ends of the way cut is no brief hold; a loop has none.
+    cut = (holds.start <= distance[0]) | (holds.end >= distance[-1])
+    weights = np.where(cut & (loop is None), weights, weights * brief)
     every = np.stack([holds.start, holds.end, weights], axis=1)
     if loop is not None:
         # Those of one round, and the same before it and after it.

@@ -22,7 +22,7 @@ from ...rotations import (
     shortest_arc,
 )
 from ...skeleton import Skeleton
-from ...smoothing import blurred, blurred_between, covered, spans
+from ...smoothing import blurred, covered, spans
 from .arm_chains import BodyFrame, joint_positions
 from .bone_rotations import ArmFrames, along_segments, arm_rest, rotate_bones, turns_in_world
 
@@ -446,12 +446,10 @@ class _TakingTime:
         for part in _TRIED:
             width, turning = self._width(part), _turns(frames, self.every)
             near, torn = (self._near(turning > each * self.most, width) for each in (1.0, _TORN))
-            fixed = held & (torn <= 0.0)
             share = np.maximum(near * loose, torn)
             if not share.any():
                 break
-            mean = blurred_between(frames, width, fixed, cyclic=self.cyclic)
-            frames = normalized(frames + share[:, None, None] * (mean - frames))
+            frames = self._mean(frames, share, width, fixed=held & (torn <= 0.0))
             whole = np.maximum(whole, share)
         return frames, whole
 
@@ -483,8 +481,10 @@ class _TakingTime:
             within[step : step + len(fast)] |= fast
         return covered(within.astype(np.float64), width, cyclic=self.cyclic)
 
-    def _mean(self, frames: Floats, share: Floats, width: int) -> Floats:
-        mean = blurred(frames, width, cyclic=self.cyclic)
+    def _mean(
+        self, frames: Floats, share: Floats, width: int, *, fixed: np.ndarray | None = None
+    ) -> Floats:
+        mean = blurred(frames, width, cyclic=self.cyclic, fixed=fixed)
         return normalized(frames + share[:, None, None] * (mean - frames))
 
 
