@@ -403,7 +403,7 @@ def _hand_over(plan: MotionPlan, posed: _Posed) -> None:
     frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
     below = None
     if ground is not None and not plan.job.in_place and plan.carry is None:
-        below = ground, plan.standing[0].radii
+        below = ground, _radii(plan)
     around, arms = ArmsAround(creature, frames, posed.going, below), posed.arms
     hand_over_arms(posed.hands, arms, around)
     if plan.carry is not None:
@@ -575,17 +575,23 @@ def _stays(plan: MotionPlan, going: Travelled, offset: Floats | None) -> Travell
 
 
 def _ground(plan: MotionPlan) -> Ground | None:
-    """What the arms stand on, where they do."""
+    """What the arms stand on, or are kept off; none where there is none."""
     if plan.laid is not None:
         return plan.laid.ground
-    return plan.standing[0].ground if plan.standing else None
+    return plan.below.ground if plan.below is not None else None
 
 
 def _underfoot(plan: MotionPlan) -> Ground | None:
     """The same as they feel it."""
     if plan.laid is not None:
         return plan.laid.felt
-    return plan.standing[0].underfoot if plan.standing else None
+    return plan.below.underfoot if plan.below is not None else None
+
+
+def _radii(plan: MotionPlan) -> Sequence[Floats]:
+    """What arms that are kept off the ground need of room, armature units."""
+    assert plan.below is not None
+    return plan.below.radii
 
 
 def _clearing(
@@ -603,7 +609,7 @@ def _clearing(
         """The same with arms off the ground that know of none."""
         if share is None:
             return poses
-        radii = [creature.scale * each for each in plan.standing[0].radii]
+        radii = [creature.scale * each for each in _radii(plan)]
         return replace(poses, rotations=keep_off_ground(course, poses, radii, share))
 
     def again(
@@ -618,6 +624,10 @@ def _clearing(
 
     whole = kept_off(Poses(arms.rotations, arms.strains, *going), loose)
     yield
+    if not plan.standing:
+        # Nothing lies on the ground, so there is nothing to raise between frames.
+        arms.rotations = whole.rotations
+        return arms
     joints = made.joints
     raised = yield from raising_between_frames(
         course, whole, joints if joints is not None else course.joints(whole), again
@@ -830,7 +840,7 @@ def _give_time(
         if ground is not None:
             course = ArmsOverGround(frames, ground, creature.scale, cyclic=cyclic)
             poses = Poses(arms.rotations, arms.strains, *going)
-            radii = [creature.scale * each for each in plan.standing[0].radii]
+            radii = [creature.scale * each for each in _radii(plan)]
             closer = MARGIN if last else 0.0
             share = above * changed
             arms.rotations = keep_off_ground(course, poses, radii, share, closer=closer)
@@ -862,7 +872,7 @@ def _trail(plan: MotionPlan, trailing: Trailing, posed: _Posed) -> Steps[None]:
         frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
         course = ArmsOverGround(frames, ground, creature.scale, cyclic=cyclic)
         poses = Poses(arms.rotations, arms.strains, *posed.going)
-        radii = [creature.scale * each for each in plan.standing[0].radii]
+        radii = [creature.scale * each for each in _radii(plan)]
         arms.rotations = keep_off_ground(course, poses, radii, free)
 
 
@@ -896,7 +906,7 @@ def _measuring(
     yield
     poses = Poses(arms.rotations, arms.strains, *going)
     below = plan.standing[0].job if plan.standing else job.floor
-    ground, stays, floor = _ground(plan), None, None
+    ground, stays, floor = _ground(plan) if plan.standing else None, None, None
     if plan.laid is None:
         stays = keyed if job.in_place else None
         floor = _floor_under(job, keyed, plan.first.poser.arm_length * creature.scale)

@@ -53,6 +53,7 @@ from ..path import (
     strides,
     transition_windows,
     transitions_by_height,
+    travel_at,
     travel_in_place,
     unhurried,
     whole_frames,
@@ -77,6 +78,7 @@ from .job import (
     Timing,
     Tolerances,
 )
+from .seabed import Seabed, seabed_below
 from .segments import Gait, Nearby, Segments, Standing, Transitions, standing_on
 
 _posers: Final[ContentCache[GaitPoser]] = ContentCache(12)
@@ -218,6 +220,8 @@ class MotionPlan:
     """What takes the motion from the plan to the world; none where they are the same."""
     laid: Laid | None = None
     """Onto what a body that rests in place is laid; none where it stays on level ground."""
+    seabed: Seabed | None = None
+    """What lies below a body that swims all the way; none where nothing does."""
 
     @property
     def first(self) -> Gait:
@@ -228,6 +232,11 @@ class MotionPlan:
     def standing(self) -> list[Standing]:
         """What holds the ground, of every gait that does."""
         return [gait.standing for gait in self.segments.gaits if gait.standing is not None]
+
+    @property
+    def below(self) -> Standing | Seabed | None:
+        """What arms are kept off, with what they need of room; none where there is no ground."""
+        return self.standing[0] if self.standing else self.seabed
 
     @property
     def can_show_contacts(self) -> bool:
@@ -370,6 +379,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         walk = (yield from scaled(standing.walking(asked), 0.6, 0.6)) if standing else None
         segments = Segments(gaits, [walk], None, [len(each) for each in job.creature.bones], route)
     yield 0.8
+    segments, seabed = _over_seabed(job, segments)
     pace = pace_of(route, when.travel, when.seconds * job.timing.rate)
     warnings = [*job.warnings, *(standing.warnings if standing is not None else ())]
     if standing is not None or changes:
@@ -396,7 +406,24 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         warnings=tuple(warnings),
         carry=_along(job, carry, faces, standing),
         laid=laid_on(job, standing, reach_of(creature)) if job.in_place else None,
+        seabed=seabed,
     )
+
+
+def _over_seabed(job: MotionJob, segments: Segments) -> tuple[Segments, Seabed | None]:
+    """The same way over the ground below it, and that ground, where the body swims all the way."""
+    swims = not any(gait.table.on_ground for gait in segments.gaits)
+    if job.floor is None or job.in_place or not swims:
+        return segments, None
+    route, travel = segments.route, segments.gaits[0].travel
+
+    def centres(distance: Floats) -> Floats:
+        phase = np.zeros_like(distance)
+        bearings = bearings_of(route, travel)
+        return segments.places(travel_at(route, travel, bearings, distance, phase))[0]
+
+    seabed = seabed_below(job.floor, route, centres, reach=reach_of(job.creature))
+    return replace(segments, lifted=seabed.lifted), seabed
 
 
 def _lowest(route: Route) -> float:
@@ -438,8 +465,9 @@ def plan_near(
         walk = standing.walk(standing.line, asked)
     bones = [len(each) for each in job.creature.bones]
     segments = Segments([moving], [walk], None, bones, when.route)
+    segments, seabed = _over_seabed(job, segments)
     yield 1.0
-    return replace(plan, segments=segments), moments
+    return replace(plan, segments=segments, seabed=seabed), moments
 
 
 def _along(

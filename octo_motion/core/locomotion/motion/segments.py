@@ -7,7 +7,7 @@ both, goes over between two of its stances, and comes to rest in either meanwhil
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -489,6 +489,9 @@ class Segments:
     bones: Sequence[int]
     """How many bones each arm has."""
     route: Route
+    lifted: Callable[[Floats], Floats] | None = None
+    """Metres (moments,) by which the body is higher, at distances (moments,), than its way through
+    the water; none for nowhere."""
 
     @property
     def changes(self) -> Sequence[GaitTransition]:
@@ -512,6 +515,12 @@ class Segments:
 
     def places(self, travel: Travel) -> tuple[Floats, Floats]:
         """Centres (moments, 3) and orientations (moments, 4) of the body, world."""
+        centres, orientations = self._places(travel)
+        if self.lifted is not None:
+            centres = centres + self.lifted(travel.distance)[:, None] * _UP
+        return centres, orientations
+
+    def _places(self, travel: Travel) -> tuple[Floats, Floats]:
         gait = self.gaits[0]
         if self.transitions is not None:
             return self.transitions.course.at(travel.distance)
@@ -539,8 +548,6 @@ class Segments:
 
     def afloat(self, distance: Floats) -> Floats | None:
         """How far arms (moments, arms) are to be kept off a ground that their gait knows not."""
-        if self.transitions is None:
-            return None
         swims = [self.walks[self.gait_of(segment)] is None for segment in range(self.count)]
         shares = [self.shares(change, distance) for change in range(len(self.changes))]
         # Of a motion on which the gait never changes, one number stands for all.

@@ -410,19 +410,26 @@ def read_floor(
     creature: Creature,
     *,
     walks: bool,
+    same_rig: Floor | None = None,
+    same_mesh: Floor | None = None,
 ) -> Floor | None:
     """The ground where nothing holds on to it: below one that swims, or about one that stays; none
-    where there is none.
+    where there is none. Of the one before what is still so, its arms or its mesh.
     """
     ground, stays = settings.ground, settings.travel_on == "NONE"
     if not ground.use or ground.object is None or (walks and not stays):
         return None
     try:
-        triangles, content = read_triangles(ground.object, depsgraph)
+        mesh = (
+            (same_mesh.triangles, same_mesh.content)
+            if same_mesh
+            else read_triangles(ground.object, depsgraph)
+        )
     except GroundError:
         # Nobody needs it: what is no ground is none to keep off.
         return None
-    return Floor(arm_skins(armature, creature.at_rest, creature.bones), triangles, content)
+    skins = same_rig.skins if same_rig else arm_skins(armature, creature.at_rest, creature.bones)
+    return Floor(skins, *mesh)
 
 
 # --- Reaches of the list: what is reached for, and where that is meanwhile ------------------------

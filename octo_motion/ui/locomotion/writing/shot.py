@@ -569,7 +569,12 @@ def prepare(
             same_rig=same_rig.ground if same_rig else None,
             same_mesh=same_ground.ground if same_ground else None,
         ),
-        floor=None if live else read_floor(settings, armature, depsgraph, creature, walks=walks),
+        floor=read_floor(
+            *(settings, armature, depsgraph, creature),
+            walks=walks,
+            same_rig=same_rig.floor if same_rig else None,
+            same_mesh=last.floor if last and before and before.ground else None,
+        ),
         volume=same_rig.volume
         if same_rig and (live or same_rig.volume is not None)
         else read_volume(settings, armature, creature, live=live),
