@@ -379,7 +379,7 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         walk = (yield from scaled(standing.walking(asked), 0.6, 0.6)) if standing else None
         segments = Segments(gaits, [walk], None, [len(each) for each in job.creature.bones], route)
     yield 0.8
-    segments, seabed = _over_seabed(job, segments)
+    segments, seabed = _over_seabed(job, segments, when.head)
     pace = pace_of(route, when.travel, when.seconds * job.timing.rate)
     warnings = [*job.warnings, *(standing.warnings if standing is not None else ())]
     if standing is not None or changes:
@@ -410,8 +410,12 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
     )
 
 
-def _over_seabed(job: MotionJob, segments: Segments) -> tuple[Segments, Seabed | None]:
-    """The same way over the ground below it, and that ground, where the body swims all the way."""
+def _over_seabed(
+    job: MotionJob, segments: Segments, head: tuple[str, ...]
+) -> tuple[Segments, Seabed | None]:
+    """The same way over the ground below it, and that ground, where the body swims all the way with
+    its head, the bones from root to tip, before it.
+    """
     swims = not any(gait.table.on_ground for gait in segments.gaits)
     if job.floor is None or job.in_place or not swims:
         return segments, None
@@ -422,7 +426,15 @@ def _over_seabed(job: MotionJob, segments: Segments) -> tuple[Segments, Seabed |
         bearings = bearings_of(route, travel)
         return segments.places(travel_at(route, travel, bearings, distance, phase))[0]
 
-    seabed = seabed_below(job.floor, route, centres, reach=reach_of(job.creature))
+    creature = job.creature
+    joints = (
+        creature.body.to_body(joint_positions(creature.skeleton, head))
+        if head
+        else np.zeros((1, 3))
+    )
+    along = np.linalg.norm(np.diff(joints, axis=0, prepend=0.0), axis=1).sum()
+    sizes = {"reach": reach_of(creature), "ahead": creature.scale * float(along)}
+    seabed = seabed_below(job.floor, route, centres, **sizes)
     return replace(segments, lifted=seabed.lifted), seabed
 
 
@@ -465,7 +477,7 @@ def plan_near(
         walk = standing.walk(standing.line, asked)
     bones = [len(each) for each in job.creature.bones]
     segments = Segments([moving], [walk], None, bones, when.route)
-    segments, seabed = _over_seabed(job, segments)
+    segments, seabed = _over_seabed(job, segments, when.head)
     yield 1.0
     return replace(plan, segments=segments, seabed=seabed), moments
 

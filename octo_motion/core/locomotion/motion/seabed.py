@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from ...content_cache import ContentCache, content_key
-from ...rotations import Floats
+from ...rotations import Floats, normalized
 from ...smoothing import covered
 from ..ground import Ground, HeightField, sample_ground
 from ..path import Route
@@ -23,7 +23,9 @@ from .segments import EDGE, FINE
 
 _ROOM: Final = 0.6
 """Arm lengths above the ground below which the middle of a body does not come, and as much to all
-sides. A mantle that dives straight down is as long."""
+sides …"""
+_BESIDE: Final = 0.2
+"""… or so many below the tip of a mantle that dives ahead of it, if that is more."""
 _STEP: Final = 0.05
 """Arm lengths between the places of the way at which that is looked for …"""
 _GENTLE: Final = 4
@@ -62,7 +64,7 @@ class Seabed:
 
 
 def seabed_below(
-    floor: Floor, route: Route, places: Callable[[Floats], Floats], *, reach: float
+    floor: Floor, route: Route, places: Callable[[Floats], Floats], *, reach: float, ahead: float
 ) -> Seabed:
     """The ground below a swim.
 
@@ -71,8 +73,11 @@ def seabed_below(
         route: of the body.
         places: where its centre is without that (n, 3), world, at distances (n,).
         reach: metres that arms are long.
+        ahead: metres from the body's centre to the tip of what goes before it.
     """
-    distance = np.linspace(0.0, route.length, max(int(np.ceil(route.length / _STEP / reach)), 1) + 1)
+    distance = np.linspace(
+        0.0, route.length, max(int(np.ceil(route.length / _STEP / reach)), 1) + 1
+    )
     path = places(distance)
     sizes = {"reach": _AROUND * reach, "spacing": FINE * reach, "headroom": _HEADROOM * reach}
     bare = float(path[:, 2].min()) - _NOWHERE * reach
@@ -86,17 +91,20 @@ def seabed_below(
 
     key = content_key(floor.content, path, sizes, bare)
     ground, underfoot = _known.get(key, below)
-    lacking = _room(ground, path, _ROOM * reach) - path[:, 2]
+    dives = ahead * np.maximum(-normalized(np.gradient(path, axis=0))[:, 2], 0.0)
+    room = np.maximum(_ROOM * reach, dives + _BESIDE * reach)
+    lacking = _height_over(ground, path, room) - path[:, 2]
     lift = covered(np.maximum(lacking, 0.0), _GENTLE, cyclic=route.cyclic)
     return Seabed(ground, underfoot, [each.radii for each in floor.skins], distance, lift)
 
 
-def _room(ground: Ground, path: Floats, room: float) -> Floats:
-    """(n,) how high a ball, flat as a bowl below, lies in the ground under places (n, 3)."""
+def _height_over(ground: Ground, path: Floats, room: Floats) -> Floats:
+    """(n,) how high a body is at least whose room (n,), a bowl, lies on the ground below (n, 3)."""
     turns = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
     around = np.stack([np.cos(turns), np.sin(turns)], axis=1)
     highest = np.full(len(path), -np.inf)
     for share in _RINGS:
-        beside = path[:, None, :2] + share * room * (around if share else around[:1])
-        highest = np.maximum(highest, ground.height(beside).max(axis=1) + room * (1.0 - share**2))
+        aside = share * room[:, None, None] * (around if share else around[:1])
+        over = ground.height(path[:, None, :2] + aside).max(axis=1) + room * (1.0 - share**2)
+        highest = np.maximum(highest, over)
     return highest
