@@ -202,6 +202,29 @@ def test_what_is_made_live_is_what_the_button_makes(octopus: Any, number: int) -
     assert motion(octopus) == followed
 
 
+def sloping(armature: Any) -> None:
+    """Give an octopus ground that nobody would take for level."""
+    ground = make_square(20.0)
+    for vertex in ground.data.vertices:
+        vertex.co.z = 0.1 * vertex.co.y - 0.05
+    settings_of(armature).ground.object = ground
+
+
+@pytest.mark.parametrize("setup", ["swim", "idle"])
+def test_what_swims_or_rests_over_ground_is_live_what_the_button_makes(
+    octopus: Any, setup: str
+) -> None:
+    sloping(octopus)
+    click("setup_load", name=setup)
+    settle()
+    level = motion(octopus)
+    settings_of(octopus).ground.object.location.z += 0.1
+    settle()
+    followed = motion(octopus)
+    generate(octopus)
+    assert motion(octopus) == followed != level
+
+
 def test_what_changes_along_with_a_dragged_route_counts_too(octopus: Any) -> None:
     settings_of(octopus).ground.object = make_square(20.0)
     settle()

@@ -14,8 +14,8 @@ from ...rotations import IDENTITY, Floats, multiply, normalized, rotate, shortes
 from ...smoothing import smooth_step
 from ..ground import Carpet, Ground, HeightField, Unrolled, sample_ground, turn_between
 from ..rig import ArmFrames, ArmMotion, BodyFrame
-from .job import MotionJob
-from .segments import EDGE, FINE, Standing
+from .job import EDGE, FINE, MotionJob
+from .segments import Standing
 
 _ATTACHED: Final = 0.4
 """Share of an arm from its root over which it passes from its body's turn to the ground's."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -21,6 +21,12 @@ from ..ground import ContactOverride, GroundMesh, MovingMesh, StanceSettings
 from ..path import Route, TravelSettings
 from ..reaching import Reaching
 from ..rig import ArmSkin, BodyFrame
+
+FINE: Final = 0.03
+"""Arm lengths between the samples of a ground."""
+EDGE: Final = 1.0 / 6.0
+"""Arm lengths: radius with which arms feel an edge. At 1/8 skin of Walk is 0.5 % of an arm in
+stairs instead of 0.3 %, without it 2.9 %."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -220,8 +220,6 @@ class MotionPlan:
     """What takes the motion from the plan to the world; none where they are the same."""
     laid: Laid | None = None
     """Onto what a body that rests in place is laid; none where it stays on level ground."""
-    seabed: Seabed | None = None
-    """What lies below a body that swims all the way; none where nothing does."""
 
     @property
     def first(self) -> Gait:
@@ -236,7 +234,7 @@ class MotionPlan:
     @property
     def below(self) -> Standing | Seabed | None:
         """What arms are kept off, with what they need of room; none where there is no ground."""
-        return self.standing[0] if self.standing else self.seabed
+        return self.standing[0] if self.standing else self.segments.seabed
 
     @property
     def can_show_contacts(self) -> bool:
@@ -379,11 +377,10 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         walk = (yield from scaled(standing.walking(asked), 0.6, 0.6)) if standing else None
         segments = Segments(gaits, [walk], None, [len(each) for each in job.creature.bones], route)
     yield 0.8
-    segments, seabed = _over_seabed(job, segments, when.head)
+    segments = _over_seabed(job, segments, when.head)
     pace = pace_of(route, when.travel, when.seconds * job.timing.rate)
     warnings = [*job.warnings, *(standing.warnings if standing is not None else ())]
-    if standing is not None or changes:
-        warnings += too_few_frames(job.timing, pace)
+    warnings += too_few_frames(job.timing, pace) if standing is not None or changes else ()
     swims = any(not gait.table.on_ground for gait in gaits)
     # A mantle that lies flat is swum along as it is.
     mantle = when.head if swims and job.streamline > 0.0 and not lean else ()
@@ -406,36 +403,28 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         warnings=tuple(warnings),
         carry=_along(job, carry, faces, standing),
         laid=laid_on(job, standing, reach_of(creature)) if job.in_place else None,
-        seabed=seabed,
     )
 
 
-def _over_seabed(
-    job: MotionJob, segments: Segments, head: tuple[str, ...]
-) -> tuple[Segments, Seabed | None]:
-    """The same way over the ground below it, and that ground, where the body swims all the way with
-    its head, the bones from root to tip, before it.
+def _over_seabed(job: MotionJob, segments: Segments, head: tuple[str, ...]) -> Segments:
+    """The same over the ground below it, where the body swims all the way with its head, the bones
+    from root to tip, before it.
     """
     swims = not any(gait.table.on_ground for gait in segments.gaits)
     if job.floor is None or job.in_place or not swims:
-        return segments, None
+        return segments
     route, travel = segments.route, segments.gaits[0].travel
 
     def centres(distance: Floats) -> Floats:
-        phase = np.zeros_like(distance)
-        bearings = bearings_of(route, travel)
+        phase, bearings = np.zeros_like(distance), bearings_of(route, travel)
         return segments.places(travel_at(route, travel, bearings, distance, phase))[0]
 
-    creature = job.creature
-    joints = (
-        creature.body.to_body(joint_positions(creature.skeleton, head))
-        if head
-        else np.zeros((1, 3))
-    )
-    along = np.linalg.norm(np.diff(joints, axis=0, prepend=0.0), axis=1).sum()
-    sizes = {"reach": reach_of(creature), "ahead": creature.scale * float(along)}
-    seabed = seabed_below(job.floor, route, centres, **sizes)
-    return replace(segments, lifted=seabed.lifted), seabed
+    creature, joints = job.creature, np.zeros((1, 3))
+    if head:
+        joints = creature.body.to_body(joint_positions(creature.skeleton, head))
+    along = float(np.linalg.norm(np.diff(joints, axis=0, prepend=0.0), axis=1).sum())
+    sizes = {"reach": reach_of(creature), "ahead": creature.scale * along}
+    return replace(segments, seabed=seabed_below(job.floor, route, centres, **sizes))
 
 
 def _lowest(route: Route) -> float:
@@ -477,9 +466,9 @@ def plan_near(
         walk = standing.walk(standing.line, asked)
     bones = [len(each) for each in job.creature.bones]
     segments = Segments([moving], [walk], None, bones, when.route)
-    segments, seabed = _over_seabed(job, segments, when.head)
+    segments = _over_seabed(job, segments, when.head)
     yield 1.0
-    return replace(plan, segments=segments, seabed=seabed), moments
+    return replace(plan, segments=segments), moments
 
 
 def _along(

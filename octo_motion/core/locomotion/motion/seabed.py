@@ -18,8 +18,7 @@ from ...rotations import Floats, normalized
 from ...smoothing import covered
 from ..ground import Ground, HeightField, sample_ground
 from ..path import Route
-from .job import Floor
-from .segments import EDGE, FINE
+from .job import EDGE, FINE, Floor
 
 _ROOM: Final = 0.6
 """Arm lengths above the ground below which the middle of a body does not come, and as much to all

@@ -7,7 +7,7 @@ both, goes over between two of its stances, and comes to rest in either meanwhil
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -69,15 +69,11 @@ from ..path import (
     way_weights,
 )
 from ..rig import ArmMotion
-from .job import Creature, GroundJob
+from .job import EDGE, FINE, Creature, GroundJob
+from .seabed import Seabed
 
-FINE: Final = 0.03
-"""Arm lengths between the samples of a ground …"""
 _COARSE: Final = 0.1
-"""… and of one that only follows the route."""
-EDGE: Final = 1.0 / 6.0
-"""Arm lengths: radius with which arms feel an edge. At 1/8 skin of Walk is 0.5 % of an arm in
-stairs instead of 0.3 %, without it 2.9 %."""
+"""Arm lengths between the samples of a ground that only follows the route."""
 _AROUND: Final = 1.8
 """Arm lengths to all sides of the route that the ground is sampled."""
 _HEADROOM: Final = 2.0
@@ -489,9 +485,8 @@ class Segments:
     bones: Sequence[int]
     """How many bones each arm has."""
     route: Route
-    lifted: Callable[[Floats], Floats] | None = None
-    """Metres (moments,) by which the body is higher, at distances (moments,), than its way through
-    the water; none for nowhere."""
+    seabed: Seabed | None = None
+    """What lies below a body that swims all the way; none where nothing does."""
 
     @property
     def changes(self) -> Sequence[GaitTransition]:
@@ -516,8 +511,8 @@ class Segments:
     def places(self, travel: Travel) -> tuple[Floats, Floats]:
         """Centres (moments, 3) and orientations (moments, 4) of the body, world."""
         centres, orientations = self._places(travel)
-        if self.lifted is not None:
-            centres = centres + self.lifted(travel.distance)[:, None] * _UP
+        if self.seabed is not None:
+            centres = centres + self.seabed.lifted(travel.distance)[:, None] * _UP
         return centres, orientations
 
     def _places(self, travel: Travel) -> tuple[Floats, Floats]:
