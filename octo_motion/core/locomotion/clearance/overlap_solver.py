@@ -97,7 +97,7 @@ def joints_of(roots: Floats, directions: Floats, lengths: Floats) -> Floats:
     return result
 
 
-_ROUNDS: Final = 12
+_ROUNDS: Final = 28
 """With eight, arms of Hurry uphill overlap by 0.083 radii instead of 0.055."""
 _BOLDLY: Final = 1.6
 """How much further arms are asked to go than they have to: they never get all the way. At 1.3 arms
@@ -218,6 +218,53 @@ class _Asked:
         chosen = np.flatnonzero(far > 1e-6 * touches.thin)
         return cls(part_of(touches, chosen), way[:, chosen], far[chosen])
 
+    def where(self, chosen: np.ndarray) -> _Asked:
+        """Of those (touches,), some."""
+        some = np.flatnonzero(chosen)
+        return _Asked(part_of(self.touches, some), self.way[:, some], self.far[some])
+
+
+class _Best:
+    """Of all rounds, for frames that have to do with each other, the one that went best."""
+
+    def __init__(self, together: np.ndarray) -> None:
+        self._together = together
+        self._bad = np.full(int(together.max(initial=-1)) + 1, np.inf)
+        self._done = np.zeros(len(self._bad), dtype=bool)
+        self.directions = np.empty(0)
+
+    def looked_at(self, directions: Floats, bad: Floats, done: np.ndarray) -> np.ndarray:
+        """Which frames (frames,) have still something to do, after a round with directions (frames,
+        arms, segments, 3) that is so bad (frames,), and is done (frames,).
+        """
+        near = self._together >= 0
+        labels = self._together[near]
+        now = np.bincount(labels, bad[near], len(self._bad))
+        left = np.bincount(labels, ~done[near], len(self._bad)) > 0.0
+        better = (now < self._bad) & ~self._done
+        if not self.directions.size:
+            self.directions = directions.copy()
+        own = near.copy()
+        own[near] = better[labels]
+        self.directions[own] = directions[own]
+        self._bad = np.where(better, now, self._bad)
+        self._done |= ~left
+        busy = near.copy()
+        busy[near] = ~self._done[labels]
+        return busy
+
+
+def _together(around: np.ndarray, count: int, *, cyclic: bool) -> np.ndarray:
+    """(frames,) numbers that are the same for frames, of those around (n,) others, which follow one
+    another, and -1 for all others.
+    """
+    near = np.zeros(count, dtype=bool)
+    near[around] = True
+    result = np.where(near, np.cumsum(near & ~np.concatenate([[False], near[:-1]])) - 1, -1)
+    if cyclic and near[0] and near[-1]:
+        result[result == result[-1]] = 0
+    return result
+
 
 class _Parting:
     """One crowd, as it makes way."""
@@ -258,20 +305,25 @@ class _Parting:
         yield 0.0
         self._loose = self._in_time(self._loose, kept)
         yield 0.0
-        for number in range(_ROUNDS):
+        best: _Best | None = None
+        for number in range(_ROUNDS + 1):
             asked = yield from self._asking(number / rounds)
-            if not number:
+            if best is None:
                 self._depths_before = _depths(asked.touches, self._held.shape)
+                best = _Best(_together(self._around, self._held.shape[0], cyclic=self._cyclic))
             yield number / rounds
-            sunk = self._room.min() < -1e-4 * self._length
-            if np.max(asked.touches.depth, initial=0.0) <= _DONE and not sunk:
+            busy = best.looked_at(self._directions, *self._how_well(asked.touches))
+            if number == _ROUNDS or not busy.any():
                 break
-            wanted = self._wanted(asked)
+            wanted = self._wanted(asked.where(busy[asked.touches.frame]))
+            wanted[~busy] = 0.0
             yield number / rounds
             wanted = self._spread(wanted)
             yield number / rounds
             self._move(wanted)
             yield number / rounds
+        assert best is not None
+        self._put_back(best.directions)
         given_up = np.zeros(self._held.shape)
         for number in range(_ROUNDS, rounds):
             asked = yield from self._asking(number / rounds)
@@ -285,6 +337,23 @@ class _Parting:
             self._give_up(np.minimum(self._covered(given_up), 1.0))
             yield number / rounds
         return self._joints
+
+    def _how_well(self, touches: Touches) -> tuple[Floats, np.ndarray]:
+        """How bad it is (frames,) that arms are in each other, as far as they would not have to go
+        back for a jump; and at which frames (frames,) nobody has to make way any more.
+        """
+        depths = _depths(touches, self._held.shape)
+        hopeless = self._hopeless(self._too_deep(touches))
+        back = np.minimum(self._covered(hopeless), 1.0) * self._depths_before
+        bad = np.maximum(np.maximum(depths, back) - _DONE, 0.0)
+        sunk = self._room.min(axis=(1, 2)) < -1e-4 * self._length
+        done = ~(depths > _DONE).any(axis=1) & ~sunk
+        return (bad * bad).sum(axis=1), done
+
+    def _put_back(self, directions: Floats) -> None:
+        """Let arms have directions (frames, arms, segments, 3) that they had in some round."""
+        chosen = np.nonzero(_differ(directions, self._directions))
+        _in_pieces(lambda own: self._put(own, directions[own]), chosen)
 
     # --- What is known before anything moves ---
 

@@ -471,9 +471,13 @@ def _times(shift: Floats, half: Floats) -> tuple[Floats, Floats, Floats]:
     """
     touch_down = np.maximum(shift - half, -_EARLIEST)
     lift_off = np.minimum(shift + half, _EARLIEST)
+    return touch_down, lift_off, _middles(touch_down, lift_off)
+
+
+def _middles(touch_down: Floats, lift_off: Floats) -> Floats:
     unrolled = touch_down + UNROLLING * (lift_off - touch_down)
     peeling = lift_off - PEELING * (lift_off - touch_down)
-    return touch_down, lift_off, 0.5 * (unrolled + peeling)
+    return 0.5 * (unrolled + peeling)
 
 
 @dataclass(frozen=True, eq=False)
@@ -645,6 +649,35 @@ def relaid(footholds: Footholds, limbs: Limbs, ground: Ground, skins: Floats) ->
         normals=normals(ground, joints),
         skins=skins,
         peeled_to=peeled_to(limbs, joint, joints, footholds.roots_at_lift_off, lasts),
+    )
+
+
+def retimed(
+    footholds: Footholds,
+    limbs: Limbs,
+    line: Line,
+    timing: ContactTiming,
+    times: tuple[Floats, Floats],
+    *,
+    middle: float,
+) -> Footholds:
+    """The same footholds, which begin and end at other times (arms, cycles) each.
+
+    What else there is to know is as of :func:`laying`, but the middle is in cycles.
+    """
+    touch_down, lift_off = times
+    numbers = footholds.first + np.arange(touch_down.shape[1])
+    roots = _RootPath(limbs, line, timing, numbers, middle)
+    at_touch_down, at_lift_off = roots.at(np.stack([touch_down, lift_off]))[0]
+    lasts = lift_off - touch_down
+    return replace(
+        footholds,
+        touch_down=touch_down,
+        lift_off=lift_off,
+        middle=_middles(touch_down, lift_off),
+        peeled_to=peeled_to(limbs, footholds.touching, footholds.joints, at_lift_off, lasts),
+        roots_at_touch_down=at_touch_down,
+        roots_at_lift_off=at_lift_off,
     )
 
 

@@ -18,6 +18,7 @@ from ..path import Line, values_along
 from ..rig import ArmSkin, BodyFrame, Facing, rotate_bones, sucker_sides
 from .arm_curves import Seen, skin_below
 from .contact_timing import ContactTiming, EvenTiming
+from .crossed_holds import taking_turns
 from .footholds import ContactOverride, Footholds, cycles_at, laying, relaid
 from .stance_swing import (
     Batch,
@@ -476,6 +477,14 @@ class GroundedWalk:
                     uneven=self._uneven,
                 )
                 parts.append(WalkPart(poser, ground, settings, sides, own, limbs, footholds))
+        turns = taking_turns(
+            [(part.limbs, part.footholds) for part in parts],
+            *(self._line, self._timing),
+            middle=self._middle / CYCLE,
+            cyclic=self._cyclic,
+        )
+        parts = [replace(part, footholds=own) for part, own in zip(parts, turns, strict=True)]
+        yield
         self._found = parts
         if not _are_round(parts, below[0]):
             self._found = [
