@@ -91,7 +91,7 @@ def test_a_cliff_that_breaks_the_walk_is_told_as_the_referee_sees_it(
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setitem(GROUNDS, "cliff", lambda x, y: 2.0 * (x > 0.0) + 0.0 * y)
+    monkeypatch.setitem(GROUNDS, "cliff", lambda x, y: 3.0 * (x > 0.0) + 0.0 * y)
 
     def upright(settings: Any) -> None:
         settings.ground.up = "WORLD"

@@ -5,8 +5,9 @@ Where capsules come too near to each other, the joints round them are asked to m
 that are free to. What lies on the ground stays, and the other goes over it or round it. What is
 asked is spread over the frames before and after, so that arms make room in time. Then segments
 turn, as little and as evenly as it takes, and an arm that holds on is drawn back to where it does.
-A few rounds of that, each beginning where the one before has ended. Arms that are still in each
-other after these could not be parted, and move as if nobody had asked.
+Rounds of that, each beginning where the one before has ended; of all rounds the one counts that
+went best, for frames that have to do with each other. Arms that are still in each other after that
+could not be parted, and move as if nobody had asked.
 
 Where a constant says what was seen when it was other, that is the default octopus with the ten
 set-ups on bumps of 0.3 arm lengths, arms overlapping by 0.02 to 0.07 radii; "jerk" as in
@@ -98,7 +99,7 @@ def joints_of(roots: Floats, directions: Floats, lengths: Floats) -> Floats:
 
 
 _ROUNDS: Final = 28
-"""With eight, arms of Hurry uphill overlap by 0.083 radii instead of 0.055."""
+"""With twelve, arms of Crawl on bumps go through each other by 1.5 radii instead of 0.05."""
 _BOLDLY: Final = 1.6
 """How much further arms are asked to go than they have to: they never get all the way. At 1.3 arms
 of Hurry uphill overlap by 0.070 radii."""
@@ -301,9 +302,9 @@ class _Parting:
         """Joints (frames, arms, joints, 3) after all rounds, in steps."""
         rounds = _ROUNDS + _REPEATS
         kept = self._crowd.kept[..., None]
-        self._free = self._in_time(self._free, kept)
+        self._free = _in_time(self._free, kept, self._covered)
         yield 0.0
-        self._loose = self._in_time(self._loose, kept)
+        self._loose = _in_time(self._loose, kept, self._covered)
         yield 0.0
         best: _Best | None = None
         for number in range(_ROUNDS + 1):
@@ -361,12 +362,6 @@ class _Parting:
         width = max(1, int(_BRIEF * self._width)) if brief else self._width
         return covered(values, width, cyclic=self._cyclic)
 
-    def _in_time(self, free: Floats, kept: np.ndarray) -> Floats:
-        """Freedom (frames, arms, …) that comes and goes smoothly, and is nowhere more."""
-        bound = np.minimum(self._covered(np.where(kept, 1.0, 1.0 - free), brief=True), 1.0)
-        left = (1.0 - bound) / (1.0 + (_RELUCTANT - 1.0) * bound)
-        return np.where((free > 0.0) & ~kept, left, 0.0)
-
     def _clearance(self) -> tuple[Floats, Floats]:
         """How high above the floor joints (frames, arms, joints) have to stay, and are above that.
 
@@ -401,28 +396,8 @@ class _Parting:
 
     def _wanted(self, asked: _Asked) -> Floats:
         """By how much joints (frames, arms, joints, 3) would have to move at their own frame."""
-        shape, touches, far = self._joints.shape, asked.touches, asked.far
-        ways = asked.way, -asked.way
-        can = [self._can(touches, which, ways[which]) for which in (0, 1)]
-        whole = can[0] + can[1] + _LITTLE
-        places, weights, pushes = [], [], []
-        for which in (0, 1):
-            own = touches.arms[which] < shape[1]
-            arm, share = touches.arms[which][own], touches.shares[which][own]
-            push = ((_BOLDLY * far * can[which] / whole) * ways[which])[:, own]
-            first = touches.frame[own] * shape[1] + arm
-            first = first * shape[2] + touches.segments[which][own]
-            for joint, part in ((0, 1.0 - share), (1, share)):
-                places.append(first + joint)
-                weights.append(far[own] * part)
-                pushes.append(weights[-1] * push)
-        place, weight = np.concatenate(places), np.concatenate(weights)
-        size = int(np.prod(shape[:3]))
-        whole = np.bincount(place, weight, size) + _LITTLE * self._scale
-        wanted = np.empty((size, 3))
-        for axis, each in enumerate(np.concatenate(pushes, axis=1)):
-            wanted[:, axis] = np.bincount(place, each, size) / whole
-        wanted = wanted.reshape(shape)
+        can = self._can(asked.touches, 0, asked.way), self._can(asked.touches, 1, -asked.way)
+        wanted = _wishes(asked, can, self._joints.shape[:3], _LITTLE * self._scale)
         slack = 1e-9 * self._length
         if self._room.min() < -slack:
             where = np.nonzero(self._room < -slack)
@@ -590,6 +565,35 @@ class _Parting:
         _in_pieces(give_up, np.nonzero((share > 1e-9) & self._changed()))
 
 
+def _wishes(
+    asked: _Asked, can: tuple[Floats, Floats], shape: tuple[int, ...], little: float
+) -> Floats:
+    """By how much joints (frames, arms, joints, 3), so many, would have to move for capsules to
+    part which are asked to, and can (touches,) the one or the other: the mean of what is asked of
+    each, by how far they are to go, where that is more than little.
+    """
+    touches, far, ways = asked.touches, asked.far, (asked.way, -asked.way)
+    whole = can[0] + can[1] + _LITTLE
+    places, weights, pushes = [], [], []
+    for which in (0, 1):
+        own = touches.arms[which] < shape[1]
+        arm, share = touches.arms[which][own], touches.shares[which][own]
+        push = ((_BOLDLY * far * can[which] / whole) * ways[which])[:, own]
+        first = touches.frame[own] * shape[1] + arm
+        first = first * shape[2] + touches.segments[which][own]
+        for joint, part in ((0, 1.0 - share), (1, share)):
+            places.append(first + joint)
+            weights.append(far[own] * part)
+            pushes.append(weights[-1] * push)
+    place, weight = np.concatenate(places), np.concatenate(weights)
+    size = int(np.prod(shape))
+    whole = np.bincount(place, weight, size) + little
+    wanted = np.empty((size, 3))
+    for axis, each in enumerate(np.concatenate(pushes, axis=1)):
+        wanted[:, axis] = np.bincount(place, each, size) / whole
+    return wanted.reshape(*shape, 3)
+
+
 def _depths(touches: Touches, shape: tuple[int, ...]) -> Floats:
     """How deep arms (frames, arms), so many, are in anything."""
     frames, arms = shape
@@ -670,6 +674,15 @@ def _freedom(in_contact: np.ndarray) -> tuple[Floats, Floats]:
     segments = smooth_step(np.minimum(onward[..., :-1], back[..., 1:]) / _BORDER)
     # The root is the body's.
     return segments, smooth_step(np.minimum(np.minimum(onward, back), numbers) / _BORDER)
+
+
+def _in_time(free: Floats, kept: np.ndarray, covered_by: Callable[..., Floats]) -> Floats:
+    """Freedom (frames, arms, …) that comes and goes smoothly, and is nowhere more: none where arms
+    are kept (frames, arms, 1) where they are.
+    """
+    bound = np.minimum(covered_by(np.where(kept, 1.0, 1.0 - free), brief=True), 1.0)
+    left = (1.0 - bound) / (1.0 + (_RELUCTANT - 1.0) * bound)
+    return np.where((free > 0.0) & ~kept, left, 0.0)
 
 
 def _differ(one: Floats, other: Floats | float) -> np.ndarray:
