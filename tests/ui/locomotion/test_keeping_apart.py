@@ -96,27 +96,14 @@ def test_arms_make_way_without_a_jump_at_any_frame_rate(octopus: Any) -> None:
         assert kept["TURN"] <= 1.05 * without["TURN"]
 
 
-def test_arms_that_swap_places_do_not_go_through_each_other_uphill_or_on_bumps() -> None:
+def test_arms_of_a_walk_do_not_go_through_each_other_on_any_ground() -> None:
     # Uphill, up stairs and on bumps they were left 1.4, 2.3 and 1.3 radii deep in each other.
-    for ground in ("slope", "stairs", "bumps"):
+    for ground in ("plane", "slope", "stairs", "bumps"):
         scene = build("walk", ground)
         told = figures(computed(scene.armature, keep_apart=True))
-        assert told["OVERLAP"] <= DEEP
+        # Less than a twentieth of a radius is what flesh gives.
+        assert told["OVERLAP"] <= 0.05
         assert told["TURN"] <= np.radians(28.0)
-
-
-def test_arms_whose_holds_cross_take_turns_and_need_not_make_way() -> None:
-    operators: Any = bpy.ops.octo_motion
-    operators.add_octopus()
-    armature: Any = bpy.context.object
-    operators.detect_arms()
-    # One let go where the other came soon after: they went through each other by 1.6 radii.
-    operators.add_route(b0=(0, 0, 0), b1=(0.1, -0.9, 0), b2=(0.9, -1.5, 0), b3=(1.5, -1.9, 0))
-    bpy.context.view_layer.objects.active = armature
-    told = figures(computed(armature, keep_apart=False))
-    assert told["OVERLAP"] <= DEEP
-    assert told["SLIP"] <= 0.002
-    assert told["TURN"] <= np.radians(25.0)
 
 
 def test_what_lives_keeps_apart_like_what_is_generated(octopus: Any) -> None:

@@ -2,9 +2,9 @@
 """Where and when arms hold on to the ground.
 
 An arm holds on once in each cycle of its gait. A foothold belongs to an arm and the number of its
-cycle. Where it is hangs on nothing else: not on frames, nor on footholds before it. It is laid
-where the gait wants it as the body passes, half way through the stance, and near enough for the arm
-to keep it while the body moves on. Arms that would lie across each other take turns.
+cycle and hangs on nothing else: not on frames, nor on footholds before it. It is laid where the
+gait wants it as the body passes, half way through the stance, and near enough for the arm to keep
+it while the body moves on.
 
 Where a constant says what was seen when it was other, that is the default octopus with the ten
 set-ups on bumps of 0.3 arm lengths, as they are slipping by 0.0001 to 0.0023 arm lengths, bones
@@ -20,7 +20,6 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats, rotate, rotate_in_plane
-from ...smoothing import smooth_step
 from ..gait import CYCLE, UnevenHolds
 from ..path import Line, values_along
 from .arm_curves import laid
@@ -472,13 +471,9 @@ def _times(shift: Floats, half: Floats) -> tuple[Floats, Floats, Floats]:
     """
     touch_down = np.maximum(shift - half, -_EARLIEST)
     lift_off = np.minimum(shift + half, _EARLIEST)
-    return touch_down, lift_off, _middles(touch_down, lift_off)
-
-
-def _middles(touch_down: Floats, lift_off: Floats) -> Floats:
     unrolled = touch_down + UNROLLING * (lift_off - touch_down)
     peeling = lift_off - PEELING * (lift_off - touch_down)
-    return 0.5 * (unrolled + peeling)
+    return touch_down, lift_off, 0.5 * (unrolled + peeling)
 
 
 @dataclass(frozen=True, eq=False)
@@ -653,35 +648,6 @@ def relaid(footholds: Footholds, limbs: Limbs, ground: Ground, skins: Floats) ->
     )
 
 
-def _retimed(
-    footholds: Footholds,
-    limbs: Limbs,
-    line: Line,
-    timing: ContactTiming,
-    times: tuple[Floats, Floats],
-    *,
-    middle: float,
-) -> Footholds:
-    """The same footholds, which begin and end at other times (arms, cycles) each.
-
-    What else there is to know is as of :func:`laying`, but the middle is in cycles.
-    """
-    touch_down, lift_off = times
-    numbers = footholds.first + np.arange(touch_down.shape[1])
-    roots = _RootPath(limbs, line, timing, numbers, middle)
-    at_touch_down, at_lift_off = roots.at(np.stack([touch_down, lift_off]))[0]
-    lasts = lift_off - touch_down
-    return replace(
-        footholds,
-        touch_down=touch_down,
-        lift_off=lift_off,
-        middle=_middles(touch_down, lift_off),
-        peeled_to=peeled_to(limbs, footholds.touching, footholds.joints, at_lift_off, lasts),
-        roots_at_touch_down=at_touch_down,
-        roots_at_lift_off=at_lift_off,
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class _Overridden:
     """Wishes by arm and cycle, (arms, cycles)."""
@@ -738,201 +704,3 @@ def _curls(limbs: Limbs, cycles: np.ndarray, seed: int) -> Floats:
     arms = np.array(limbs.arms)[:, None]
     mixed = np.sin(12.9898 * (arms + 1.0) + 78.233 * (cycles + 0.5) + 37.719 * (seed + 1.0))
     return _CURL * (np.mod(43758.5453 * mixed, 1.0) - 0.5)
-
-
-# --- Holds of two arms that lie across each other, the one soon after the other ------------------
-#
-# Between the two there is not time enough for the one to get out of the way of the other: they
-# would have to go through each other. So the first lets go sooner, and the second comes later, as
-# far as enough arms stand meanwhile.
-
-
-_BETWEEN: Final = 0.3
-"""Strides that the body goes on from where the first of two arms lets go to where the other lands
-…"""
-_SOONER: Final = 0.06
-"""… and by how much of one either hold gets shorter for that at most, …"""
-_OF_IT: Final = 0.12
-"""… and of itself."""
-_PARTS: Final = (0.5, 1.0)
-"""Shares of what is lacking that each of the two is asked for, one after the other: the second time
-of what the other could not give."""
-_CLEAR: Final = 1.7
-"""How many times their thickness arms are beside each other, and are not in each other's way."""
-_STANDING: Final = 3.0 / 8.0
-"""Share of the arms that walk which stand at any time: where no more do, no hold gets shorter.
-Without that one arm alone stands at times, or none."""
-_PLACES: Final = 100
-"""Places in a stride at which they are counted."""
-_ON_SEGMENT: Final = 4
-"""Places of each segment at which that is looked at."""
-_WITHIN: Final = 0.03
-"""Cycles in which it is seen how fast the body goes as a hold begins or ends …"""
-_STANDS: Final = 0.2
-"""… and share of its usual pace below which it stands there: that hold begins or ends at rest."""
-
-
-def taking_turns(
-    parts: Sequence[tuple[Limbs, Footholds]],
-    line: Line,
-    timing: ContactTiming,
-    *,
-    middle: float,
-    wishes: Sequence[ContactOverride] = (),
-) -> list[Footholds]:
-    """The footholds of all arms of a body, by how they are built, with time between those that lie
-    across each other.
-
-    Args:
-        parts: arms that are built alike, and their footholds.
-        line: the body's way.
-        timing: when arms hold on.
-        middle: cycles by which the middle of a stance is later, as the gait has it.
-        wishes: the artist's: what comes sooner or later is as long as it would be in its time.
-    """
-    holds = _Holds(parts, timing, middle, wishes)
-    sooner, later = holds.shorter(line.settings.stride)
-    result, start = [], 0
-    for limbs, footholds in parts:
-        shape = footholds.touch_down.shape
-        own = slice(start, start + footholds.touch_down.size)
-        start = own.stop
-        less = [each[own].reshape(shape) for each in (later, sooner)]
-        if not (less[0].any() or less[1].any()):
-            result.append(footholds)
-            continue
-        times = footholds.touch_down + less[0], footholds.lift_off - less[1]
-        result.append(_retimed(footholds, limbs, line, timing, times, middle=middle))
-    return result
-
-
-class _Holds:
-    """All holds of a body (holds,), part by part, arm by arm, cycle by cycle."""
-
-    def __init__(
-        self,
-        parts: Sequence[tuple[Limbs, Footholds]],
-        timing: ContactTiming,
-        middle: float,
-        wishes: Sequence[ContactOverride],
-    ) -> None:
-        arms, ends, paces, there, thick = [], [], [], [], []
-        seen: list[list[Floats]] = []
-        for limbs, footholds in parts:
-            shape = footholds.touch_down.shape
-            cycles = footholds.first + np.arange(shape[1])
-            shift = np.zeros(shape)
-            for each in wishes:
-                own = each.cycle - footholds.first
-                if each.arm in limbs.arms and 0 <= own < shape[1]:
-                    shift[limbs.arms.index(each.arm), own] = each.shift
-            on, off = footholds.touch_down - shift, footholds.lift_off - shift
-            since = np.stack([on, on + _WITHIN, off - _WITHIN, off], axis=-1)
-            found = timing.distances(limbs.arms, middle + cycles[:, None] + since)
-            ends.append(found[..., [0, 3]].reshape(-1, 2))
-            paces.append((np.diff(found, axis=-1)[..., [0, 2]] / _WITHIN).reshape(-1, 2))
-            arms.append(np.repeat(limbs.arms, shape[1]))
-            there.append(footholds.present.reshape(-1))
-            thick.append(footholds.skins.max(axis=-1).reshape(-1))
-            roots = footholds.roots_at_touch_down, footholds.roots_at_lift_off
-            joints = [
-                np.concatenate([each[:, :, None], footholds.joints], axis=2) for each in roots
-            ]
-            seen.append([_seen(each) for each in joints])
-        self._arms, self._ends = np.concatenate(arms), np.concatenate(ends)
-        self._paces, self._thick = np.concatenate(paces), np.concatenate(thick)
-        self._there = np.concatenate(there)
-        self._seen = [[each for part in seen for each in part[end]] for end in (0, 1)]
-        """As a hold begins, and as it ends."""
-
-    def shorter(self, stride: float) -> tuple[Floats, Floats]:
-        """By how many cycles each hold (holds,) ends sooner, and begins later."""
-        between, ends = _BETWEEN * stride, self._ends.copy()
-        # From where a first arm lets go to where a second one comes.
-        apart = ends[None, :, 0] - ends[:, None, 1]
-        goes = (self._paces > _STANDS * stride) & self._there[:, None]
-        soon = (np.abs(apart) < between) & (self._arms[:, None] != self._arms)
-        soon &= goes[:, None, 1] & goes[:, 0] & self._may_cross()
-        pairs = [(*each, self._crossed(*each)) for each in np.argwhere(soon).tolist()]
-        holding = len(np.unique(self._arms[self._there]))
-        standing = _Standing(ends[self._there], holding, stride / _PLACES)
-        most = np.minimum(_SOONER * stride, _OF_IT * (ends[:, 1] - ends[:, 0]))
-        for part in _PARTS:
-            for one, other, share in pairs:
-                for hold, end in ((one, 1), (other, 0)):
-                    lacking = share * between - (ends[other, 0] - ends[one, 1]) * share
-                    used = abs(ends[hold, end] - self._ends[hold, end])
-                    less = min(part * lacking, most[hold] - used)
-                    if less > 0.0:
-                        ends[hold, end] = standing.shortened(ends[hold], end, less)
-        paces = np.maximum(self._paces, _STANDS * stride)
-        less = np.abs(ends - self._ends) / paces
-        return less[:, 1], less[:, 0]
-
-    def _may_cross(self) -> np.ndarray:
-        """(holds, holds) whether arms are not beside each other altogether, as most are: the first
-        as its hold ends, the second as its begins.
-        """
-        room = _CLEAR * self._thick[:, None]
-        (low, high), (begin, end) = (
-            [
-                np.array([each.min(axis=0) for each in seen]) - room,
-                np.array([each.max(axis=0) for each in seen]) + room,
-            ]
-            for seen in (self._seen[1], self._seen[0])
-        )
-        return np.all((begin <= high[:, None]) & (end >= low[:, None]), axis=-1)
-
-    def _crossed(self, one: int, other: int) -> float:
-        """How far a hold as it ends and another as it begins are in each other's way, 0…1."""
-        steps = self._seen[1][one][:, None] - self._seen[0][other]
-        wide = float(self._thick[one] + self._thick[other])
-        near = float(np.sqrt(np.einsum("ijc,ijc->ij", steps, steps).min())) / wide
-        return float(smooth_step(np.array((_CLEAR - near) / (_CLEAR - 1.0))))
-
-
-class _Standing:
-    """How many arms stand at places along the way."""
-
-    def __init__(self, ends: Floats, arms: int, step: float) -> None:
-        self._least = int(np.ceil(_STANDING * arms))
-        self._start, self._step = float(ends.min(initial=0.0)), step
-        # Places at which an arm stands all the while.
-        first, last = self._places(ends)
-        self._count = np.zeros(int(last.max(initial=0)) + 2, dtype=int)
-        for begin, end in zip(first.tolist(), last.tolist(), strict=True):
-            self._count[begin:end] += 1
-
-    def _places(self, ends: Floats) -> tuple[np.ndarray, np.ndarray]:
-        numbers = (ends - self._start) / self._step
-        return np.ceil(numbers[..., 0]).astype(int), np.floor(numbers[..., 1]).astype(int)
-
-    def shortened(self, ends: Floats, which: int, less: float) -> float:
-        """Where a hold (2,) begins or ends that gets shorter by so many metres, or by fewer where
-        no more arms stand than have to.
-        """
-        first, last = (int(each) for each in self._places(ends))
-        there = float(ends[which]) + (less if which == 0 else -less)
-        number = (there - self._start) / self._step
-        if which == 0:
-            own = np.arange(first - 1, min(int(np.ceil(number)), len(self._count)))
-        else:
-            own = np.arange(last, max(int(np.floor(number)), 0) - 1, -1)
-        # In the place of its end it is not counted.
-        few = np.flatnonzero(self._count[own] < self._least + (np.arange(len(own)) > 0))
-        if len(few):
-            stays = self._start + self._step * (own[few[0]] + which)
-            there = min(there, stays) if which == 0 else max(there, stays)
-            there = max(there, ends[0]) if which == 0 else min(there, ends[1])
-            own = own[: few[0]]
-        self._count[own[1:]] -= 1
-        return float(there)
-
-
-def _seen(joints: Floats) -> Floats:
-    """Points (arms · cycles, points, 2) of arms (arms, cycles, joints, 3), seen from above."""
-    steps = np.arange(_ON_SEGMENT)[:, None] / _ON_SEGMENT
-    first, second = joints[:, :, :-1, None, :2], joints[:, :, 1:, None, :2]
-    points = first + steps * (second - first)
-    # From its root an arm goes to where it lies as it does from joint to joint there.
-    return points.reshape(points.shape[0] * points.shape[1], -1, 2)

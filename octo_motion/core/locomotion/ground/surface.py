@@ -651,7 +651,8 @@ class StanceSettings:
         "Hold",
         "Share of its cycle for which an arm holds on to the ground. More keeps more arms down at "
         "a time; less gives them longer swings",
-        default=0.55,
+        # At 0.55 arms of the default walk go through each other for a frame or two.
+        default=0.5,
         low=0.1,
         high=0.85,
         subtype="FACTOR",

@@ -18,7 +18,7 @@ from ..path import Line, values_along
 from ..rig import ArmSkin, BodyFrame, Facing, rotate_bones, sucker_sides
 from .arm_curves import Seen, skin_below
 from .contact_timing import ContactTiming, EvenTiming
-from .footholds import ContactOverride, Footholds, cycles_at, laying, relaid, taking_turns
+from .footholds import ContactOverride, Footholds, cycles_at, laying, relaid
 from .stance_swing import (
     Batch,
     Stance,
@@ -392,7 +392,6 @@ class GroundedWalk:
         contact_overrides: the artist's footholds.
         timing: when arms hold on; none for the gait's own.
         cyclic: whether each cycle is like the one before.
-        turns: whether arms whose holds cross take turns.
         skins: of each arm: where one is not round, it lies on the side that is below. None for
             round ones.
     """
@@ -413,11 +412,10 @@ class GroundedWalk:
         contact_overrides: Sequence[ContactOverride] = (),
         timing: ContactTiming | None = None,
         cyclic: bool = False,
-        turns: bool = False,
         skins: Sequence[ArmSkin] = (),
     ) -> None:
         self._poser, self._line, self._ground, self._settings = poser, line, ground, settings
-        self._scale, self._cyclic, self._turns = scale, cyclic, turns
+        self._scale, self._cyclic = scale, cyclic
         self._middle = poser.settings.gait.power_phase
         self._body_turn = from_matrix(body.rotation)
         self._stride = line.settings.stride
@@ -478,15 +476,6 @@ class GroundedWalk:
                     uneven=self._uneven,
                 )
                 parts.append(WalkPart(poser, ground, settings, sides, own, limbs, footholds))
-        if self._turns:
-            turns = taking_turns(
-                [(part.limbs, part.footholds) for part in parts],
-                *(self._line, self._timing),
-                middle=self._middle / CYCLE,
-                wishes=contact_overrides,
-            )
-            parts = [replace(part, footholds=own) for part, own in zip(parts, turns, strict=True)]
-            yield
         self._found = parts
         if not _are_round(parts, below[0]):
             self._found = [

@@ -148,12 +148,6 @@ class Standing:
         centres, upright = self.line.ride(travel.positions, travel.distance)
         return centres, leaning(upright, travel.rotations)
 
-    @property
-    def _even(self) -> bool:
-        """Whether nobody says when arms hold on but the gait, for all of the way."""
-        walks = self.poser.settings.gait.manner == "WALK"
-        return walks and not self.cyclic and self.line.settings.along.hold is None
-
     def walk(self, line: Line, overrides: Sequence[ContactOverride]) -> GroundedWalk:
         """The walk with its footholds and the artist's, on this body's way, or one that it is part
         of.
@@ -173,7 +167,6 @@ class Standing:
             contact_overrides=overrides,
             timing=self.timing,
             cyclic=self.cyclic,
-            turns=self._even and line is self.line,
             skins=self.job.skins,
         )
 

@@ -11,5 +11,6 @@ settings.gait = "idle"
 # Nobody goes anywhere: what rests on the ground stays where it is.
 settings.table.stride = 0.01
 settings.cycle_time = 5.0
+settings.ground.duty = 0.55
 settings.breathing = 0.09
 settings.breath_time = 2.5

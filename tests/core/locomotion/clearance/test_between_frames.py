@@ -54,7 +54,7 @@ class Shot:
 
 
 def test_on_bumps_at_a_fast_pace_arms_are_raised_at_the_frames_round_a_dip() -> None:
-    shot = Shot(walker(GROUNDS["bumps"], stretch=True), 14)
+    shot = Shot(walker(GROUNDS["bumps"], stretch=True), 20)
     poses, joints = shot.whole()
     low = np.zeros_like(shot.course.clear(joints))
     before = shot.course.dips(poses, low)
