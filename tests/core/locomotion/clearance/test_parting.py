@@ -3,12 +3,14 @@
 
 from dataclasses import replace
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from octo_motion.core.locomotion.clearance import overlap_solver
 from octo_motion.core.locomotion.clearance.capsule_overlap import (
     NEAR,
     Capsules,
@@ -384,6 +386,52 @@ def test_arms_that_cannot_be_parted_move_as_before() -> None:
     moved = parted(group, (), floor=Level(), width=WIDTH, most=MOST)
     assert moved is not None
     np.testing.assert_allclose(moved, group.joints, atol=1e-9)
+
+
+@pytest.mark.parametrize("group", [beside(), over_lying()], ids=["in the air", "lying"])
+def test_arms_part_the_same_whatever_cannot_be_parted_at_another_time(group: Crowd) -> None:
+    alone = parted(group, (), floor=Level(), width=WIDTH, most=MOST)
+    later = crossing(slice(40, 80))
+    both = replace(
+        group,
+        **{
+            name: np.concatenate([getattr(each, name) for each in (group, later)])
+            for name in ("joints", "in_contact", "kept", "up")
+        },
+    )
+    moved = parted(both, (), floor=Level(), width=WIDTH, most=MOST)
+    assert alone is not None
+    assert moved is not None
+    # The ends of a motion are means of what goes on there.
+    np.testing.assert_allclose(moved[:100], alone[:100], atol=1e-9)
+
+
+def tangled(seed: int) -> Crowd:
+    """Three arms of which each swings through the others."""
+    random = np.random.default_rng(seed)
+    time = np.linspace(0.0, 2.0 * np.pi, FRAMES)
+    arms = [
+        straight(
+            random.uniform(0.3, 0.8) * np.sin(random.uniform(1.0, 2.5) * time + place),
+            random.uniform(0.05, 0.15),
+            at=0.3 - 0.3 * place,
+        )
+        for place in range(3)
+    ]
+    return crowd(*arms)
+
+
+@settings(max_examples=15, deadline=None)
+@given(SEEDS)
+def test_more_rounds_are_never_worse(seed: int) -> None:
+    group, left = tangled(seed), []
+    for rounds in (3, 8, 28):
+        with patch.object(overlap_solver, "_ROUNDS", rounds):
+            moved = parted(group, (), floor=Level(), width=WIDTH, most=MOST)
+        depths = depth(group, group.joints if moved is None else moved)
+        left.append(float((np.maximum(depths - 0.05, 0.0) ** 2).sum()))
+    assert left[2] <= left[0] + 1e-6 + 0.02 * left[0]
+    assert left[2] <= left[1] + 1e-6 + 0.02 * left[1]
 
 
 def test_what_overlaps_nearly_all_the_while_is_the_creature_s_own_form() -> None:
