@@ -54,7 +54,7 @@ class Shot:
 
 
 def test_on_bumps_at_a_fast_pace_arms_are_raised_at_the_frames_round_a_dip() -> None:
-    shot = Shot(walker(GROUNDS["bumps"], stretch=True), 20)
+    shot = Shot(walker(GROUNDS["bumps"], stretch=True), 18)
     poses, joints = shot.whole()
     low = np.zeros_like(shot.course.clear(joints))
     before = shot.course.dips(poses, low)
@@ -123,7 +123,7 @@ def test_what_cannot_be_helped_gets_no_worse(frames: int, *, stretch: bool) -> N
 
 
 def test_an_arm_that_is_raised_alone_is_raised_as_with_all_others() -> None:
-    shot = Shot(walker(GROUNDS["bumps"], stretch=True), 20)
+    shot = Shot(walker(GROUNDS["bumps"], stretch=True), 18)
     shot.whole()
     chosen = np.arange(5, 25)
     lift = np.full((20, len(shot.course.arms)), 0.02)
