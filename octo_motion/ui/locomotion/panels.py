@@ -235,7 +235,7 @@ class OCTO_MOTION_PT_generate(_Panel, bpy.types.Panel):
             travels.operator(
                 OCTO_MOTION_OT_add_route.bl_idname, text="Add Route", icon="CURVE_BEZCURVE"
             )
-        if settings.table.manner != "SWIM" and settings.ground.use:
+        if settings.ground.use:
             travels.prop(settings.ground, "object", text="Ground")
         column.row().prop(settings, "timing", expand=True)
         values = {"CADENCE": "cycle_time", "SPEED": "speed", "RANGE": "frame_end"}

@@ -7,10 +7,12 @@ import bpy
 import numpy as np
 import pytest
 
+from octo_motion.ui.locomotion import panels
 from tests.referee import creature_measures as measures
 from tests.referee.recording import moments, record
 from tests.referee.scenes import Scene, build
 from tests.referee.surface import Surface
+from tests.ui.test_panels import Layout
 
 LOW = np.array([[-1.8, 0.3, 0.0], [-0.6, -0.75, 0.0], [0.45, 0.9, 0.0], [1.8, 0.15, 0.0]])
 """A way that lies on the floor, as one for a walk does."""
@@ -83,3 +85,16 @@ def test_under_a_roof_a_swim_stays_below_it() -> None:
     heights = centres(scene)[:, 2]
     assert heights.min() > 0.2
     assert heights.max() < 1.5
+
+
+def test_the_ground_of_a_swim_is_chosen_beside_its_route() -> None:
+    settings = build("swim", "plane").armature.octo_motion.locomotion
+    shown: dict[bool, list[str]] = {}
+    for held in (True, False):
+        settings.ground.use = held
+        layout, panel = Layout(), panels.OCTO_MOTION_PT_generate
+        panel.show(None, layout, settings)  # pyright: ignore[reportArgumentType]
+        shown[held] = layout.drawn
+    at = shown[True].index("route")
+    assert shown[True][at + 1] == "object"
+    assert "object" not in shown[False]
