@@ -82,13 +82,13 @@ class OCTO_MOTION_PG_ground(bpy.types.PropertyGroup):
     use: props.BoolProperty(
         name="Hold the Ground",
         description="Walking, each arm takes hold of the ground and does not slide over it, while "
-        "the body moves on. Off, the arms move as the gait alone has them",
+        "the body moves on; a swim keeps over it. Off, the arms move as the gait alone has them",
         default=True,
     )
     object: props.PointerProperty(
         name="Ground",
-        description="Mesh to walk on, as it is seen: with its modifiers, moved and scaled. Without "
-        "one, the ground is where the route is",
+        description="Mesh to walk on, or to swim over, as it is seen: with its modifiers, moved "
+        "and scaled. Without one, a walk's ground is where the route is",
         type=bpy.types.Object,
         poll=may_be_ground,
     )
