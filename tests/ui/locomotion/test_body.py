@@ -59,24 +59,41 @@ def test_it_is_the_same_motion_at_any_frame_rate(octopus: Any) -> None:
     np.testing.assert_allclose(found[0], found[1], atol=1e-6)
 
 
-def test_files_of_before_keep_their_look(octopus: Any, tmp_path: Path) -> None:
-    body = octopus.octo_motion.locomotion.body
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "new.blend"))
-    assert body.file_knows == 1
-    # As a file of an earlier version has it.
+def saved_as_before(octopus: Any, path: Path, knows: int) -> None:
+    """Save the file as an earlier version has it."""
     from octo_motion.ui import registration
 
     bpy.app.handlers.save_pre.remove(registration._before_saving)
     try:
-        body.property_unset("file_knows")
-        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "old.blend"))
+        octopus.octo_motion.locomotion.body.file_knows = knows
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
     finally:
         bpy.app.handlers.save_pre.append(registration._before_saving)
-    for name, amount in (("new", 1.0), ("old", 0.0)):
+
+
+def test_files_of_before_keep_their_look(octopus: Any, tmp_path: Path) -> None:
+    along = octopus.octo_motion.locomotion.along.add()
+    along.setting = "HOLD"
+    names = ("new", "breathing", "old")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "new.blend"))
+    assert octopus.octo_motion.locomotion.body.file_knows == 2
+    for knows, name in ((1, "breathing"), (0, "old")):
+        saved_as_before(octopus, tmp_path / f"{name}.blend", knows)
+    for name, amount, hold in zip(names, (1.0, 1.0, 0.0), (0.5, 0.55, 0.55), strict=True):
         bpy.ops.wm.open_mainfile(filepath=str(tmp_path / f"{name}.blend"))
-        opened = bpy.data.objects["Octopus"].octo_motion.locomotion.body
-        assert opened.surge == pytest.approx(amount)
-        assert opened.file_knows == 1
+        opened = bpy.data.objects["Octopus"].octo_motion.locomotion
+        assert opened.body.surge == pytest.approx(amount)
+        assert opened.ground.duty == pytest.approx(hold)
+        assert opened.along[0].hold == pytest.approx(hold)
+        assert opened.body.file_knows == 2
+
+
+def test_a_hold_that_a_file_of_before_tells_is_kept(octopus: Any, tmp_path: Path) -> None:
+    octopus.octo_motion.locomotion.ground.duty = 0.5
+    saved_as_before(octopus, tmp_path / "old.blend", 1)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "old.blend"))
+    opened = bpy.data.objects["Octopus"].octo_motion.locomotion
+    assert opened.ground.duty == pytest.approx(0.5)
 
 
 # --- Mantle, head, siphon and eyes ----------------------------------------------------------------

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import Any, Final
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, Final, NamedTuple
 
 import bpy
 
@@ -12,12 +12,32 @@ from ....core.locomotion.body import BodySettings
 from ... import declared_settings as props
 from ...declared_settings import assign, declared
 
-CURRENT: Final = 1
-"""Which settings a saved file knows: 1 since the body moves by itself."""
-BEFORE: Final = dict.fromkeys(("surge", "mantle", "siphon", "eyes", "head"), 0.0)
-"""What settings were worth before there were any, by name: files of then keep their look …"""
-BEFORE_BESIDE: Final = {"breathing": 0.0, "uneven": 0.0}
-"""… and those beside them."""
+CURRENT: Final = 2
+"""Which settings a saved file knows: 1 since the body moves by itself, 2 since arms of a walk hold
+on for half a cycle."""
+
+
+class _Before(NamedTuple):
+    """What settings that a file does not tell were worth when it was saved."""
+
+    known: int
+    """Files that know this have the defaults of now."""
+    groups: Callable[[Any], Iterable[Any]]
+    """Those that have the settings, of the locomotion of an object."""
+    values: Mapping[str, float]
+    """By the setting's name."""
+
+
+_BEFORE: Final = (
+    _Before(
+        1,
+        lambda locomotion: (locomotion.body,),
+        dict.fromkeys(("surge", "mantle", "siphon", "eyes", "head"), 0.0),
+    ),
+    _Before(1, lambda locomotion: (locomotion,), {"breathing": 0.0, "uneven": 0.0}),
+    _Before(2, lambda locomotion: (locomotion.ground,), {"duty": 0.55}),
+    _Before(2, lambda locomotion: locomotion.along, {"hold": 0.55}),
+)
 
 
 def _bone(name: str, description: str) -> Any:
@@ -59,16 +79,21 @@ def stamp(objects: Iterable[bpy.types.Object]) -> None:
 
 
 def keep_look(objects: Iterable[bpy.types.Object]) -> None:
-    """Let creatures of files that were saved before there were these settings move as they did."""
+    """Let creatures of files that were saved with other defaults move as they did."""
     for locomotion in _used(objects):
-        body = locomotion.body
-        if body.file_knows >= CURRENT:
-            continue
-        for group, before in ((body, BEFORE), (locomotion, BEFORE_BESIDE)):
-            for name, value in before.items():
-                if not group.is_property_set(name):
-                    setattr(group, name, value)
-        body.file_knows = CURRENT
+        knows = locomotion.body.file_knows
+        for before in _BEFORE:
+            if knows < before.known:
+                for group in before.groups(locomotion):
+                    _fill(group, before.values)
+        locomotion.body.file_knows = CURRENT
+
+
+def _fill(group: Any, values: Mapping[str, float]) -> None:
+    """Set what a group's file does not tell."""
+    for name, value in values.items():
+        if not group.is_property_set(name):
+            setattr(group, name, value)
 
 
 def _used(objects: Iterable[bpy.types.Object]) -> Iterator[Any]:
