@@ -92,6 +92,9 @@ class OCTO_MOTION_PT_route(_Panel, bpy.types.Panel):
         if settings.table.manner != "SWIM":
             layout.prop(settings, "stalk")
         if settings.table.manner != "SWIM" and settings.ground.use:
+            row = layout.row()
+            row.active = settings.heading == "ALONG"
+            row.prop(settings, "slow_in_bends")
             draw_rest(layout, settings)
 
 

@@ -155,7 +155,7 @@ def finding_line(
     positions, turns = (np.concatenate(each) for each in zip(*walked, strict=True))
     along, left = _ways(positions)
     felt = ground.height(positions[:, None, :2] + reach * _ACROSS[:, None] * left[:, None])
-    kernel, share = _bell(width / spacing), distance / route.length
+    kernel, share = _bell(width / spacing), route.share_at(distance)
     clearances = clearance + values_along(settings.along.height, share, 0.0)
     headroom = np.maximum(_HEADROOM * clearances, np.minimum(under, _MOST_HEADROOM * clearances))
     level = _over_bumps(

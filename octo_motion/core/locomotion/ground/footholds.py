@@ -497,7 +497,7 @@ class _RootPath:
 
     def duty(self, settings: StanceSettings, shift: Floats) -> Floats:
         """Cycles (arms, cycles) that stances last which are shifted by so many (arms, cycles)."""
-        share = self._distances(shift) / self.line.route.length
+        share = self.line.route.share_at(self._distances(shift))
         return values_along(self.line.settings.along.hold, share, settings.duty)
 
     def _distances(self, since: Floats) -> Floats:

@@ -27,7 +27,7 @@ from ...rotations import (
     shortest_arc,
     to_matrix,
 )
-from ..path import Route
+from ..path import Route, SlowedRoute
 
 _SPACING: Final = 0.15
 """Arm lengths between places at which the ground's normal is asked for."""
@@ -179,6 +179,8 @@ class Unrolled:
 
     def route(self, route: Route) -> Route:
         """The route in the plan: as long, and as fast where the curve's own parameter counts."""
+        if isinstance(route, SlowedRoute):
+            return route.of_curve(self.route(route.bare))
         count = int(np.clip(np.ceil(route.length / (_STEP * self.reach)), 16, 4096)) + 1
         parameter = np.linspace(0.0, 1.0, count)
         place = (route.distance_at(parameter) - self.start) / self.spacing
@@ -254,7 +256,7 @@ def roll_out(
         beyond: metres before and after the route that are walked on, too.
         always: whether the ground's normal is up, however steep it is.
     """
-    spacing = _SPACING * reach
+    route, spacing = route.bare, _SPACING * reach
     ahead = int(np.ceil((beyond + _WINDOW * reach) / spacing))
     count = int(route.length / spacing)
     distance = spacing * np.arange(-ahead, count + ahead + 1)

@@ -600,7 +600,7 @@ class GroundedWalk:
 
     def _lift(self, phase: Floats) -> Floats:
         """Arm lengths (frames,) that arms are lifted at the body's phases (frames,)."""
-        share = phase / CYCLE * self._stride / self._line.route.length
+        share = self._line.route.share_at(phase / CYCLE * self._stride)
         return values_along(self._line.settings.along.lift, share, self._settings.lift)
 
     @property

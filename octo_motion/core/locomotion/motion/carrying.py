@@ -13,6 +13,7 @@ from ...content_cache import ContentCache, content_key
 from ...rotations import IDENTITY, Floats, multiply, normalized, rotate, shortest_arc, slerp
 from ...smoothing import smooth_step
 from ..ground import Carpet, Ground, HeightField, Unrolled, sample_ground, turn_between
+from ..path import Route
 from ..rig import ArmFrames, ArmMotion, BodyFrame
 from .job import EDGE, FINE, MotionJob
 from .segments import Standing
@@ -52,6 +53,8 @@ class Carry:
     """None where the plan is the world."""
     reach: float
     """Metres that arms are long."""
+    route: Route
+    """What the body's distances are counted on."""
     carpet: Carpet | None = None
     """None where the ground stays."""
 
@@ -65,7 +68,8 @@ class Carry:
         else on that right below them.
         """
         shape, ones = points.shape[:-1], [1] * (points.ndim - 2)
-        along = np.broadcast_to(distance.reshape(-1, *ones), shape)
+        metres = self.route.metres_at(distance)
+        along = np.broadcast_to(metres.reshape(-1, *ones), shape)
         there, turns = self._up(points, along)
         if self.carpet is None or frames is None:
             return there, turns

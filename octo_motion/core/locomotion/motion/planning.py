@@ -49,7 +49,9 @@ from ..path import (
     duration,
     paced_time,
     plan_travel,
+    rounding,
     route_in_place,
+    slowed_in_bends,
     strides,
     transition_windows,
     transitions_by_height,
@@ -305,6 +307,23 @@ def with_half_frames(values: Floats) -> Floats:
     return result
 
 
+def in_bends(job: MotionJob) -> MotionJob:
+    """The same motion, slower in bends that are too tight for arms that hold on."""
+    walks = [each.travel for each in job.gaits if each.settings.gait.on_ground]
+    turning = [each for each in walks if each.heading == "ALONG" and each.slow_in_bends > 0.0]
+    if job.route is None or job.ground is None or not turning:
+        return job
+    travel = max(turning, key=lambda each: each.stride)
+    stride = travel.stride * reach_of(job.creature)
+    route = slowed_in_bends(
+        job.route,
+        stride=stride,
+        corner=rounding(job.route, travel.corner * stride),
+        amount=travel.slow_in_bends,
+    )
+    return replace(job, route=route)
+
+
 def schedule(job: MotionJob) -> Schedule:
     """Where a motion goes and when, which is soon known: what is reached for is read on its frames.
 
@@ -484,7 +503,8 @@ def _along(
     source = np.arange(len(faces)) if source is None else source
     carpet = Carpet.of(ground.moving, standing.ground, faces, source)
     reach = reach_of(job.creature)
-    return Carry(carry.unrolled if carry is not None else None, reach, carpet)
+    unrolled = carry.unrolled if carry is not None else None
+    return Carry(unrolled, reach, standing.line.route, carpet)
 
 
 def _planning(
@@ -512,7 +532,8 @@ def _planning(
     space, faces, source = found
     overrides = tuple(_in_plan(each, space) for each in ground.overrides)
     ground = replace(ground, mesh=GroundMesh(key, lambda: faces), overrides=overrides)
-    return replace(job, route=space.route(route), ground=ground), Carry(space, reach), source
+    carry = Carry(space, reach, route)
+    return replace(job, route=space.route(route), ground=ground), carry, source
 
 
 def _in_plan(override: ContactOverride, space: Unrolled) -> ContactOverride:
@@ -821,11 +842,10 @@ def _transitions(job: MotionJob, route: Route, first: Gait) -> tuple[GaitTransit
     if not isinstance(changes, ChangesByHeight):
         found = [
             GaitTransition(
-                each.position * route.length - 0.5 * each.length * reach,
-                each.position * route.length + 0.5 * each.length * reach,
-                each.gait,
+                place - 0.5 * each.length * reach, place + 0.5 * each.length * reach, each.gait
             )
             for each in changes
+            for place in (route.distance_of(each.position),)
         ]
         return check_transitions(found, route.length)
     count = int(np.ceil(_SAMPLES * route.length / reach)) + 2

@@ -2,6 +2,7 @@
 """Where the body is and which way it faces, over time."""
 
 from .along_route import ValuesAlong
+from .bends import SlowedRoute, slowed_in_bends
 from .course import (
     Course,
     Line,
@@ -33,6 +34,7 @@ from .travel import (
     paced_time,
     plan_travel,
     raised_along,
+    rounding,
     strides,
     travel_at,
     unhurried,
@@ -47,6 +49,7 @@ __all__ = [
     "GaitTransition",
     "Line",
     "Route",
+    "SlowedRoute",
     "SwumLine",
     "Travel",
     "TravelSettings",
@@ -61,8 +64,10 @@ __all__ = [
     "paced_time",
     "plan_travel",
     "raised_along",
+    "rounding",
     "route_in_place",
     "s_bend",
+    "slowed_in_bends",
     "slowing",
     "strides",
     "transition_windows",

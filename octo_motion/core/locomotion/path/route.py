@@ -68,6 +68,10 @@ def bezier_spans(
 SHORTEST: Final = 1e-6
 """Metres. A route below it is a point."""
 
+_AT_JOINT: Final = 1e-12
+"""Share of the route's parameter within which a sample lies at a joint: far above rounding, some
+1e-15, and far below the table's intervals, 3e-5 and more."""
+
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 _AT_ONCE: Final = 2048
 """Places times nodes that are looked at together."""
@@ -236,7 +240,7 @@ class Route:
         piece = np.clip(np.searchsorted(self._distances, flat, "right") - 1, 0, last)
         start, low, high = self._pieces[piece], self._pieces[piece], self._pieces[piece + 1]
         missing = flat - self._distances[piece]
-        s = np.clip(_looked_up(self._places, flat), low, high)
+        s = np.clip(looked_up(self._places, flat), low, high)
         # Each element stops on its own account, so that its last digit depends on no other.
         busy = np.arange(len(flat))
         for _ in range(_MOST_STEPS):
@@ -259,7 +263,7 @@ class Route:
     def parameter_near(self, distance: ArrayLike) -> Floats:
         """The same to about a thousandth of a segment, which is soon found."""
         wanted = np.clip(np.asarray(distance, dtype=np.float64), 0.0, self.length)
-        return np.clip(_looked_up(self._places, wanted), 0.0, 1.0)
+        return np.clip(looked_up(self._places, wanted), 0.0, 1.0)
 
     @cached_property
     def _places(self) -> tuple[Floats, Floats, Floats]:
@@ -273,6 +277,24 @@ class Route:
         slopes = np.divide(1.0, speed, out=np.zeros_like(speed), where=speed > 1e-9 * self.length)
         distances = np.append(self._distances[:-1, None] + arcs, self.length)
         return np.maximum.accumulate(distances), parameters, slopes
+
+    @property
+    def bare(self) -> Route:
+        """The curve as it is, where distances count as more than they are."""
+        return self
+
+    def metres_at(self, distance: ArrayLike) -> Floats:
+        """Metres ``(…,)`` along the curve as it is."""
+        return np.asarray(distance, dtype=np.float64)
+
+    def share_at(self, distance: ArrayLike) -> Floats:
+        """Share ``(…,)`` of the curve that lies before a distance ``(…,)``."""
+        return self.metres_at(distance) / self.bare.length
+
+    def distance_of(self, share: float) -> float:
+        """Distance at a share of the curve."""
+        curve = self.bare
+        return float(self.distance_at(curve.parameter_at(share * curve.length)))
 
     def reverse(self) -> Route:
         """The same curve travelled from its end to its start."""
@@ -426,7 +448,17 @@ def _bernstein(controls: Floats, segment: np.ndarray, t: Floats, highest: int) -
     return result
 
 
-def _looked_up(table: tuple[Floats, Floats, Floats], at: Floats) -> Floats:
+def past_joints(samples: Floats, breaks: Floats) -> Floats:
+    """Parameters ``(n,)`` of which those at a joint of the route's segments are exactly there.
+
+    Directions jump at a corner, and a sample there has the one that follows. Rounding alone would
+    choose between the two, and the same route elsewhere would turn one sample earlier or later.
+    """
+    joint = breaks[np.searchsorted(breaks, samples - _AT_JOINT)]
+    return np.where(np.abs(samples - joint) <= _AT_JOINT, joint, samples)
+
+
+def looked_up(table: tuple[Floats, Floats, Floats], at: Floats) -> Floats:
     """Values at places (n,), by the cubics between those of a table: places (m,) that ascend,
     values there, and slopes.
     """

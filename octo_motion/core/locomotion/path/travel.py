@@ -32,7 +32,7 @@ from ...settings import check_settings, setting, share_setting
 from ...smoothing import smooth_step
 from ..gait import CYCLE
 from .along_route import PacedTime, Stops, ValuesAlong
-from .route import Route
+from .route import Route, past_joints
 
 _FEWEST: Final = 1024
 _MOST: Final = 32768
@@ -45,9 +45,6 @@ _MOST_CORNER: Final = 1.0 / 24.0
 """Corner radius as a share of the route, at most."""
 _TAIL: Final = 12.0
 """Corner radii after which a delay is forgotten: e⁻¹²."""
-_AT_JOINT: Final = 1e-12
-"""Share of the route's parameter within which a sample lies at a joint: far above rounding, some
-1e-15, and far below the table's intervals, 3e-5 and more."""
 
 # Sine of the angle between travel and the vertical: up holds fully above the one, not at all
 # below the other.
@@ -149,18 +146,21 @@ class Bearings:
         return laps, distance - laps * self.length
 
     def _between(self, table: Floats, distance: Floats) -> Floats:
-        """The table at distances ``(frames,)``, by the cubic through its neighbours' slopes."""
-        first = 2.0 * table[:1] - table[1:2]
-        last = 2.0 * table[-1:] - table[-2:-1]
-        padded = np.concatenate([first, table, last])
-        place = distance * ((len(table) - 1) / self.length)
-        index = np.clip(place.astype(np.int64), 0, len(table) - 2)
-        t = (place - index).reshape(-1, *[1] * (table.ndim - 1))
-        p0, p1, p2, p3 = (padded[index + step] for step in range(4))
-        slope, reach = p2 - p0, p3 - p1
-        ends = (2.0 * t - 3.0) * t * t
-        cubic = p1 + ends * (p1 - p2)
-        return cubic + 0.5 * t * (1.0 - t) * ((1.0 - t) * slope - t * reach)
+        return _between(table, distance * ((len(table) - 1) / self.length))
+
+
+def _between(table: Floats, place: Floats) -> Floats:
+    """A table at places ``(frames,)``, by the cubic through its neighbours' slopes."""
+    first = 2.0 * table[:1] - table[1:2]
+    last = 2.0 * table[-1:] - table[-2:-1]
+    padded = np.concatenate([first, table, last])
+    index = np.clip(place.astype(np.int64), 0, len(table) - 2)
+    t = (place - index).reshape(-1, *[1] * (table.ndim - 1))
+    p0, p1, p2, p3 = (padded[index + step] for step in range(4))
+    slope, reach = p2 - p0, p3 - p1
+    ends = (2.0 * t - 3.0) * t * t
+    cubic = p1 + ends * (p1 - p2)
+    return cubic + 0.5 * t * (1.0 - t) * ((1.0 - t) * slope - t * reach)
 
 
 def bearings(route: Route, corner: float, settle: float, *, coarse: bool = False) -> Bearings:
@@ -169,26 +169,25 @@ def bearings(route: Route, corner: float, settle: float, *, coarse: bool = False
     Before and after a sharp corner most of it is turned through within some metres; within others,
     a body that is not upright comes most of the way to settle there.
     """
-    corner = min(corner, _MOST_CORNER * route.length)
+    curve, corner = route.bare, rounding(route, corner)
     per_corner, fewest = (_PER_CORNER_COARSE, 0) if coarse else (_PER_CORNER, _FEWEST)
-    count = int(np.clip(np.ceil(per_corner * route.length / corner), fewest, _MOST))
-    spacing = route.length / count
+    count = int(np.clip(np.ceil(per_corner * curve.length / corner), fewest, _MOST))
+    spacing = curve.length / count
     corner = max(corner, 4.0 * spacing)
-    distances = np.linspace(0.0, route.length, count + 1)
-    samples = route.parameter_near(distances) if coarse else route.parameter_at(distances)
-    raw = route.tangent(_past_joints(samples, route.breaks))
-    travel = _rounded(raw, exp(-spacing / corner), int(_TAIL * corner / spacing), route.cyclic)
-    return Bearings(route.length, route.cyclic, travel, spacing / settle)
+    distances = np.linspace(0.0, curve.length, count + 1)
+    samples = curve.parameter_near(distances) if coarse else curve.parameter_at(distances)
+    raw = curve.tangent(past_joints(samples, curve.breaks))
+    travel = _rounded(raw, exp(-spacing / corner), int(_TAIL * corner / spacing), curve.cyclic)
+    if curve is not route:
+        # A corner is rounded off by metres as they are, however many they count as.
+        places = route.metres_at(np.linspace(0.0, route.length, count + 1))
+        travel = normalized(_between(travel, places / spacing))
+    return Bearings(route.length, route.cyclic, travel, route.length / count / settle)
 
 
-def _past_joints(samples: Floats, breaks: Floats) -> Floats:
-    """Parameters ``(n,)`` of which those at a joint of the route's segments are exactly there.
-
-    Directions jump at a corner, and a sample there has the one that follows. Rounding alone would
-    choose between the two, and the same route elsewhere would turn one sample earlier or later.
-    """
-    joint = breaks[np.searchsorted(breaks, samples - _AT_JOINT)]
-    return np.where(np.abs(samples - joint) <= _AT_JOINT, joint, samples)
+def rounding(route: Route, corner: float) -> float:
+    """Metres within which a corner of a route is rounded off that is to be so within some."""
+    return min(corner, _MOST_CORNER * route.bare.length)
 
 
 def _rounded(raw: Floats, keep: float, tail: int, cyclic: bool) -> Floats:  # noqa: FBT001
@@ -475,6 +474,13 @@ class TravelSettings:
     lean: float = 0.0
     """SWIM: how far from +Z towards the back the way lies that goes along travel, for bodies whose
     mantle lies flat behind them; at 90° they swim backwards, upright."""
+    slow_in_bends: float = share_setting(
+        "Slow in Bends",
+        "How much a body slows down where its way bends too tightly for arms that hold on: they "
+        "take more and shorter steps there. 0 keeps its pace",
+        default=0.0,
+        offered=1.0,
+    )
     keep_upright: bool = setting(
         "Keep Upright",
         "Walking, stay upright on a slope instead of leaning with it",
@@ -655,7 +661,8 @@ def paced_time(route: Route, settings: TravelSettings) -> PacedTime | None:
     pace, stops = settings.along.pace, _stops(route, settings)
     if pace is None and stops is None:
         return None
-    return PacedTime(pace, stops, _share_of_way(route, settings, np.linspace(0, 1, _PACED)))
+    share = _share_of_way(route, settings, np.linspace(0, 1, _PACED))
+    return PacedTime(pace, stops, route.share_at(share * route.length))
 
 
 def _stops(route: Route, settings: TravelSettings) -> Stops | None:
@@ -676,7 +683,7 @@ def _share_of_way(route: Route, settings: TravelSettings, parameter: Floats) -> 
 
 def raised_along(route: Route, settings: TravelSettings, distance: Floats) -> Floats:
     """Metres (…,) by which a body is higher at distances (…,) than elsewhere on its route."""
-    return values_along(settings.along.height, distance / route.length, 0.0)
+    return values_along(settings.along.height, route.share_at(distance), 0.0)
 
 
 def unhurried(

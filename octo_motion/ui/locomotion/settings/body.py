@@ -14,7 +14,7 @@ from ...declared_settings import assign, declared
 
 CURRENT: Final = 2
 """Which settings a saved file knows: 1 since the body moves by itself, 2 since arms of a walk hold
-on for half a cycle."""
+on for half a cycle, and the body slows down in bends."""
 
 
 class _Before(NamedTuple):
@@ -35,6 +35,7 @@ _BEFORE: Final = (
         dict.fromkeys(("surge", "mantle", "siphon", "eyes", "head"), 0.0),
     ),
     _Before(1, lambda locomotion: (locomotion,), {"breathing": 0.0, "uneven": 0.0}),
+    _Before(2, lambda locomotion: (locomotion,), {"slow_in_bends": 0.0}),
     _Before(2, lambda locomotion: (locomotion.ground,), {"duty": 0.55}),
     _Before(2, lambda locomotion: locomotion.along, {"hold": 0.55}),
 )

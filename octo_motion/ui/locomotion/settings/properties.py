@@ -249,6 +249,7 @@ class RouteSettings:
     speed_mode: declared(TravelSettings, "speed")
     ease_in: declared(TravelSettings, "ease_in")
     stalk: declared(TravelSettings, "stalk")
+    slow_in_bends: declared(TravelSettings, "slow_in_bends")
     ease_out: declared(TravelSettings, "ease_out")
     heading: declared(TravelSettings, "heading")
     heading_angle: declared(TravelSettings, "heading_angle")

@@ -43,6 +43,7 @@ from ....core.locomotion.motion import (
     MotionPlan,
     MotionResult,
     compute,
+    in_bends,
     plan_motion,
     schedule,
     shown_contacts,
@@ -587,6 +588,7 @@ def prepare(
         live=live,
         warnings=(*found.warnings, *warnings_for_display(armature, scene.render), *found.poses),
     )
+    job = in_bends(job)
     if settings.body.look_at is not None or any(not item.mute for item in settings.reaches):
         frames = schedule(job).frames
         look = replace(job.body, look_at=read_look(settings, armature, frames))
@@ -627,7 +629,7 @@ def prepare_anew(
     _check_route(settings, armature)
     _write_back(settings.route)
     route = read_route(settings.route, context.evaluated_depsgraph_get(), settings.spline)
-    return replace(before.shot, job=replace(job, route=route))
+    return replace(before.shot, job=in_bends(replace(job, route=route)))
 
 
 def _with_motion_of_ground(
