@@ -16,6 +16,7 @@ from ...errors import SettingsError
 from ...phrases import phrase
 from ...rotations import Floats, multiply, normalized, rotate
 from ...skeleton import Skeleton
+from ...steps import finished
 from ..body import BodyTrack, Holds, SelfMotion, Stalking, Surge, self_motion, steps_of, surge
 from ..gait import (
     CYCLE,
@@ -40,6 +41,7 @@ from ..path import (
     GaitTransition,
     Line,
     Route,
+    SlowedRoute,
     SwumLine,
     TravelSettings,
     WalkedLine,
@@ -308,20 +310,31 @@ def with_half_frames(values: Floats) -> Floats:
 
 
 def in_bends(job: MotionJob) -> MotionJob:
-    """The same motion, slower in bends that are too tight for arms that hold on."""
+    """The same motion, slower in bends that are too tight for arms that hold on: so it is planned,
+    and so it is asked for when what it takes is read.
+    """
+    planned, _, _ = finished(_planning(job))
+    route = slowed_route(planned)
+    curve = job.route
+    if curve is None or not isinstance(route, SlowedRoute):
+        return job
+    return replace(job, route=route.of_curve(curve.bare))
+
+
+def slowed_route(job: MotionJob) -> Route | None:
+    """The route of a motion in its plan, on which it is slower in tight bends."""
     walks = [each.travel for each in job.gaits if each.settings.gait.on_ground]
     turning = [each for each in walks if each.heading == "ALONG" and each.slow_in_bends > 0.0]
     if job.route is None or job.ground is None or not turning:
-        return job
+        return job.route
     travel = max(turning, key=lambda each: each.stride)
     stride = travel.stride * reach_of(job.creature)
-    route = slowed_in_bends(
+    return slowed_in_bends(
         job.route,
         stride=stride,
         corner=rounding(job.route, travel.corner * stride),
         amount=travel.slow_in_bends,
     )
-    return replace(job, route=route)
 
 
 def schedule(job: MotionJob) -> Schedule:
@@ -370,6 +383,9 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         OctoMotionError: something is wrong that the user can put right.
     """
     job, carry, faces = yield from scaled(_planning(job), 0.0, 0.0)
+    job = replace(job, route=slowed_route(job))
+    if carry is not None and job.route is not None:
+        carry = replace(carry, route=job.route)
     yield 0.0
     when = schedule(job)
     route, lean = when.route, when.lean
@@ -463,6 +479,7 @@ def plan_near(
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
+    job = replace(job, route=slowed_route(job))
     when, gait, before = schedule(job), job.gaits[0], known.first.standing
     plan = replace(known, job=job, schedule=when)
     moments, near = slice(plan.moment_of(first), plan.moment_of(last) + 1), None
@@ -532,8 +549,8 @@ def _planning(
     space, faces, source = found
     overrides = tuple(_in_plan(each, space) for each in ground.overrides)
     ground = replace(ground, mesh=GroundMesh(key, lambda: faces), overrides=overrides)
-    carry = Carry(space, reach, route)
-    return replace(job, route=space.route(route), ground=ground), carry, source
+    flat = space.route(route)
+    return replace(job, route=flat, ground=ground), Carry(space, reach, flat), source
 
 
 def _in_plan(override: ContactOverride, space: Unrolled) -> ContactOverride:
@@ -568,7 +585,7 @@ def gait_targets(job: MotionJob) -> GaitTargets:
     Raises:
         OctoMotionError: something is wrong that the user can put right.
     """
-    when = schedule(job)
+    when = schedule(in_bends(job))
     poser, body = _poser(job, job.gaits[0], when.lean), job.creature.body
     travel = plan_travel(when.route, when.travel, when.times)
     places = body.center + target_places(poser, travel.phase, travel.turn) @ body.rotation.T

@@ -33,7 +33,7 @@ from .pipeline import (
     organs_at,
     way_of,
 )
-from .planning import MotionPlan, plan_near
+from .planning import MotionPlan, plan_near, slowed_route
 
 _WINDOW: Final = 12
 """Moments to either side of one of which it is found at once what the frames around them make of
@@ -144,7 +144,7 @@ class Sketch:
         footholds are as far beside the route as those that are known.
         """
         plan, (centres, held) = self._known.plan, self._way
-        route, before = job.route or plan.schedule.route, plan.schedule.route
+        route, before = slowed_route(job) or plan.schedule.route, plan.schedule.route
         places = np.concatenate([centres, held])
         if route is before:
             return centres, held

@@ -588,9 +588,8 @@ def prepare(
         live=live,
         warnings=(*found.warnings, *warnings_for_display(armature, scene.render), *found.poses),
     )
-    job = in_bends(job)
     if settings.body.look_at is not None or any(not item.mute for item in settings.reaches):
-        frames = schedule(job).frames
+        frames = schedule(in_bends(job)).frames
         look = replace(job.body, look_at=read_look(settings, armature, frames))
         reaching = read_reaches(armature, settings, found, frames)
         job = replace(job, reaching=reaching, body=look)
@@ -629,7 +628,7 @@ def prepare_anew(
     _check_route(settings, armature)
     _write_back(settings.route)
     route = read_route(settings.route, context.evaluated_depsgraph_get(), settings.spline)
-    return replace(before.shot, job=in_bends(replace(job, route=route)))
+    return replace(before.shot, job=replace(job, route=route))
 
 
 def _with_motion_of_ground(
@@ -638,7 +637,7 @@ def _with_motion_of_ground(
     """The same motion, on ground that moves meanwhile if it does."""
     if job.ground is None or job.ground.mesh is None:
         return job
-    moving = read_moving(job.ground, armature, ground, schedule(job).frames)
+    moving = read_moving(job.ground, armature, ground, schedule(in_bends(job)).frames)
     return replace(job, ground=moving)
 
 
