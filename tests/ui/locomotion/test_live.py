@@ -225,6 +225,21 @@ def test_what_swims_or_rests_over_ground_is_live_what_the_button_makes(
     assert motion(octopus) == followed != level
 
 
+def test_a_bend_that_gets_tight_is_live_what_the_button_makes(octopus: Any) -> None:
+    points = settings_of(octopus).route.data.splines[0].bezier_points
+    points[0].handle_right, points[1].handle_left = (0.0, -4.0, 0.0), (-0.5, -4.0, 0.5)
+    points[1].co = (-0.5, -1.0, 0.5)
+    settle()
+    followed = motion(octopus)
+    generate(octopus)
+    assert motion(octopus) == followed
+    settings_of(octopus).slow_in_bends = 0.4
+    settle()
+    less = motion(octopus)
+    generate(octopus)
+    assert motion(octopus) == less != followed
+
+
 def test_what_changes_along_with_a_dragged_route_counts_too(octopus: Any) -> None:
     settings_of(octopus).ground.object = make_square(20.0)
     settle()

@@ -116,8 +116,8 @@ def slowed_in_bends(route: Route, *, stride: float, corner: float, amount: float
     first, last = (turned[-1], turned[0]) if route.cyclic else (turned[0], turned[-1])
     around = np.concatenate([[first], turned, [last]])
     rate = 0.5 * (around[1:] + around[:-1]) / spacing * stride / _TURNED
-    # A body turns before and after a corner, as two delays of that size have it.
-    width = np.hypot(np.sqrt(2.0) * corner, _EVEN * stride) / spacing
+    # A body turns before and after a corner, fastest in the middle.
+    width = np.hypot(corner, _EVEN * stride) / spacing
     rate = np.maximum(evened(rate, width, cyclic=route.cyclic), 0.0)
     if rate.max() <= _FROM:
         return route
