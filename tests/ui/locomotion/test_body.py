@@ -85,6 +85,7 @@ def test_files_of_before_keep_their_look(octopus: Any, tmp_path: Path) -> None:
         assert opened.body.surge == pytest.approx(amount)
         assert opened.ground.duty == pytest.approx(hold)
         assert opened.along[0].hold == pytest.approx(hold)
+        assert opened.slow_in_bends == pytest.approx(float(name == "new"))
         assert opened.body.file_knows == 2
 
 

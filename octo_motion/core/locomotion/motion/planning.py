@@ -314,11 +314,9 @@ def in_bends(job: MotionJob) -> MotionJob:
     and so it is asked for when what it takes is read.
     """
     planned, _, _ = finished(_planning(job))
-    route = slowed_route(planned)
-    curve = job.route
-    if curve is None or not isinstance(route, SlowedRoute):
+    if job.route is None or not isinstance(planned.route, SlowedRoute):
         return job
-    return replace(job, route=route.of_curve(curve.bare))
+    return replace(job, route=planned.route.of_curve(job.route.bare))
 
 
 def slowed_route(job: MotionJob) -> Route | None:
@@ -383,9 +381,6 @@ def plan_motion(job: MotionJob) -> Generator[float, None, MotionPlan]:
         OctoMotionError: something is wrong that the user can put right.
     """
     job, carry, faces = yield from scaled(_planning(job), 0.0, 0.0)
-    job = replace(job, route=slowed_route(job))
-    if carry is not None and job.route is not None:
-        carry = replace(carry, route=job.route)
     yield 0.0
     when = schedule(job)
     route, lean = when.route, when.lean
@@ -525,6 +520,17 @@ def _along(
 
 
 def _planning(
+    job: MotionJob,
+) -> Generator[None, None, tuple[MotionJob, Carry | None, np.ndarray | None]]:
+    """The same motion in its plan, slower in tight bends. In steps; see :func:`_rolling_out`."""
+    job, carry, source = yield from _rolling_out(job)
+    job = replace(job, route=slowed_route(job))
+    if carry is not None and job.route is not None:
+        carry = replace(carry, route=job.route)
+    return job, carry, source
+
+
+def _rolling_out(
     job: MotionJob,
 ) -> Generator[None, None, tuple[MotionJob, Carry | None, np.ndarray | None]]:
     """The same motion on its ground rolled out, where that has an up of its own; then which of its

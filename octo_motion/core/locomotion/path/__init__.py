@@ -2,7 +2,6 @@
 """Where the body is and which way it faces, over time."""
 
 from .along_route import ValuesAlong
-from .bends import SlowedRoute, slowed_in_bends
 from .course import (
     Course,
     Line,
@@ -22,7 +21,7 @@ from .gait_changes import (
     transitions_by_height,
     way_weights,
 )
-from .route import Route, s_bend
+from .route import Route, SlowedRoute, s_bend, slowed_in_bends
 from .travel import (
     AlongRoute,
     Bearings,

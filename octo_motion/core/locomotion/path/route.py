@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...errors import RouteError
 from ...phrases import phrase
 from ...rotations import Floats, normalized
+from ...smoothing import evened
 
 
 def bezier_spans(
@@ -193,15 +194,15 @@ class Route:
 
     def position(self, s: ArrayLike) -> Floats:
         """Points of the route ``(…, 3)`` at parameters ``(…,)``: eq. 3.19 for one segment."""
-        return self._derivatives(s, 0)[0]
+        return _derivatives(self.controls, self.breaks, s, 0)[0]
 
     def velocity(self, s: ArrayLike) -> Floats:
         """First derivative by s ``(…, 3)``: the true derivative, 3 × the printed eq. 3.20."""
-        return self._derivatives(s, 1)[1]
+        return _derivatives(self.controls, self.breaks, s, 1)[1]
 
     def acceleration(self, s: ArrayLike) -> Floats:
         """Second derivative by s ``(…, 3)``: the true derivative, 6 × the printed eq. 3.21."""
-        return self._derivatives(s, 2)[2]
+        return _derivatives(self.controls, self.breaks, s, 2)[2]
 
     def tangent(self, s: ArrayLike) -> Floats:
         """Unit vectors along the route ``(…, 3)``.
@@ -240,7 +241,7 @@ class Route:
         piece = np.clip(np.searchsorted(self._distances, flat, "right") - 1, 0, last)
         start, low, high = self._pieces[piece], self._pieces[piece], self._pieces[piece + 1]
         missing = flat - self._distances[piece]
-        s = np.clip(looked_up(self._places, flat), low, high)
+        s = np.clip(_looked_up(self._places, flat), low, high)
         # Each element stops on its own account, so that its last digit depends on no other.
         busy = np.arange(len(flat))
         for _ in range(_MOST_STEPS):
@@ -263,7 +264,7 @@ class Route:
     def parameter_near(self, distance: ArrayLike) -> Floats:
         """The same to about a thousandth of a segment, which is soon found."""
         wanted = np.clip(np.asarray(distance, dtype=np.float64), 0.0, self.length)
-        return np.clip(looked_up(self._places, wanted), 0.0, 1.0)
+        return np.clip(_looked_up(self._places, wanted), 0.0, 1.0)
 
     @cached_property
     def _places(self) -> tuple[Floats, Floats, Floats]:
@@ -306,24 +307,6 @@ class Route:
         moved = self.controls @ affine.T
         return Route(moved, self.breaks, self.cyclic)
 
-    def _derivatives(self, s: ArrayLike, highest: int) -> list[Floats]:
-        """Position and its derivatives by s up to the ``highest`` (0, 1 or 2), each ``(…, 3)``."""
-        at = np.clip(np.asarray(s, dtype=np.float64), 0.0, 1.0)
-        segment, share = self._segment(at)
-        t = ((at - self.breaks[segment]) / share)[..., None]
-        homogeneous = _bernstein(self.controls, segment, t, highest)
-        weight = homogeneous[0][..., 3:]
-        result = [homogeneous[0][..., :3] / weight]
-        if highest >= 1:
-            first = homogeneous[1]
-            result.append((first[..., :3] - first[..., 3:] * result[0]) / weight)
-        if highest >= 2:
-            first, second = homogeneous[1], homogeneous[2]
-            bend = second[..., :3] - 2.0 * first[..., 3:] * result[1] - second[..., 3:] * result[0]
-            result.append(bend / weight)
-        # From the parameter of the segment to that of the whole route.
-        return [each / share[..., None] ** power for power, each in enumerate(result)]
-
     def _arc(self, start: Floats, end: Floats) -> Floats:
         return self._measured(start, end)[0]
 
@@ -348,7 +331,7 @@ class Route:
             return lambda s: _norm(self.velocity(s))
         # Quadrature asks for little else: without weights, the derivative is a polynomial, whose
         # coefficients are gathered once for all nodes, components first: long rows are quick.
-        segment, share = self._segment(middle)
+        segment, share = _segment(self.breaks, middle)
         start, hodograph = self.breaks[segment], np.diff(self.controls[..., :3], axis=1)
         degree = hodograph.shape[1] - 1
         powers = [
@@ -366,12 +349,6 @@ class Route:
             return (degree + 1) / share * np.sqrt(x * x + y * y + z * z)
 
         return speed
-
-    def _segment(self, s: Floats) -> tuple[NDArray[np.intp], Floats]:
-        """Which segment parameters ``(…,)`` lie in, and its share of the route's parameter."""
-        last = len(self.controls) - 1
-        segment = np.clip(np.searchsorted(self.breaks, s, "right") - 1, 0, last)
-        return segment, self.breaks[segment + 1] - self.breaks[segment]
 
     @cached_property
     def _pieces(self) -> Floats:
@@ -426,6 +403,32 @@ def s_bend(start: ArrayLike, front: ArrayLike, reach: float) -> Floats:
     )
 
 
+def _derivatives(controls: Floats, breaks: Floats, s: ArrayLike, highest: int) -> list[Floats]:
+    """Position and its derivatives by s up to the ``highest`` (0, 1 or 2), each ``(…, 3)``."""
+    at = np.clip(np.asarray(s, dtype=np.float64), 0.0, 1.0)
+    segment, share = _segment(breaks, at)
+    t = ((at - breaks[segment]) / share)[..., None]
+    homogeneous = _bernstein(controls, segment, t, highest)
+    weight = homogeneous[0][..., 3:]
+    result = [homogeneous[0][..., :3] / weight]
+    if highest >= 1:
+        first = homogeneous[1]
+        result.append((first[..., :3] - first[..., 3:] * result[0]) / weight)
+    if highest >= 2:
+        first, second = homogeneous[1], homogeneous[2]
+        bend = second[..., :3] - 2.0 * first[..., 3:] * result[1] - second[..., 3:] * result[0]
+        result.append(bend / weight)
+    # From the parameter of the segment to that of the whole route.
+    return [each / share[..., None] ** power for power, each in enumerate(result)]
+
+
+def _segment(breaks: Floats, s: Floats) -> tuple[NDArray[np.intp], Floats]:
+    """Which segment parameters ``(…,)`` lie in, and its share of the route's parameter."""
+    last = len(breaks) - 2
+    segment = np.clip(np.searchsorted(breaks, s, "right") - 1, 0, last)
+    return segment, breaks[segment + 1] - breaks[segment]
+
+
 def _bernstein(controls: Floats, segment: np.ndarray, t: Floats, highest: int) -> list[Floats]:
     """Bézier segments (segments, degree + 1, 4) and their derivatives, up to the highest wanted, by
     their own parameter t (…, 1), by de Casteljau.
@@ -458,7 +461,7 @@ def past_joints(samples: Floats, breaks: Floats) -> Floats:
     return np.where(np.abs(samples - joint) <= _AT_JOINT, joint, samples)
 
 
-def looked_up(table: tuple[Floats, Floats, Floats], at: Floats) -> Floats:
+def _looked_up(table: tuple[Floats, Floats, Floats], at: Floats) -> Floats:
     """Values at places (n,), by the cubics between those of a table: places (m,) that ascend,
     values there, and slopes.
     """
@@ -515,3 +518,128 @@ def _check_joints(segments: Floats, cyclic: bool) -> None:  # noqa: FBT001
         raise RouteError("The route has a gap between two spans.", "Rebuild the curve.")
     if cyclic and np.linalg.norm(segments[-1, -1] - segments[0, 0]) > near:
         raise RouteError("The closed route does not end where it starts.", "Rebuild the curve.")
+
+
+# --- Bends that are tighter than arms can follow --------------------------------------------------
+#
+# An arm that holds on stays where it is while the body turns about it. Within half a cycle it is
+# left behind by half of what the body turns in one; where that is more than its neighbour is away,
+# the two go through each other. An animal that turns in a small space takes short steps. So a route
+# counts as longer in a tight bend than it is, by as much as it takes to turn no faster: all that
+# goes by metres of the route, the rhythm of the arms and the pace of the body alike, follows from
+# that one table.
+
+
+_TURNED: Final = np.radians(50.0)
+"""What a body turns by in a cycle of its gait at most, about. Eight arms are 45° apart, and hold on
+for half a cycle. Of 18 walks and hurries along hairpins, loops and ways of random turns, arms go
+through each other in none; at 60° in four, and in eleven without a limit."""
+_FROM, _WHOLLY = 0.5, 1.5
+"""Shares of that from which on a route begins to count as longer, and from which on it does so by
+all that it turns too fast. Where it turns by less than the first, nothing changes."""
+_PER_STRIDE: Final = 32
+"""Places of the table in a stride: twice as many change no place of the body by a thousandth of
+one."""
+_FEWEST: Final = 64
+_MOST: Final = 16384
+_EVEN: Final = 0.1
+"""Strides by which what a route turns is evened out besides its corners: the pace changes as
+smoothly as that."""
+
+
+@dataclass(frozen=True, eq=False)
+class SlowedRoute(Route):
+    """A route that counts as longer in tight bends than it is; all distances are so."""
+
+    curve: Route
+    """As it is."""
+    metres: Floats
+    """(n,) along that, evenly from its start to its end …"""
+    counted: Floats
+    """(n,) … what these count as, …"""
+    slower: Floats
+    """(n,) … and how many times as long the route is there."""
+
+    @property
+    def bare(self) -> Route:
+        """The curve as it is."""
+        return self.curve
+
+    @cached_property
+    def length(self) -> float:
+        """Metres that it counts as."""
+        return float(self.counted[-1])
+
+    def distance_at(self, s: ArrayLike) -> Floats:
+        """Metres ``(…,)`` that the way from its start to parameters ``(…,)`` counts as."""
+        metres = self.curve.distance_at(s)
+        found = _looked_up((self.metres, self.counted, self.slower), metres.reshape(-1))
+        return found.reshape(metres.shape)
+
+    def parameter_at(self, distance: ArrayLike) -> Floats:
+        """Parameters ``(…,)`` where it counts as so many metres ``(…,)``."""
+        return self.curve.parameter_at(self.metres_at(distance))
+
+    def parameter_near(self, distance: ArrayLike) -> Floats:
+        """The same to about a thousandth of a segment."""
+        return self.curve.parameter_near(self.metres_at(distance))
+
+    def metres_at(self, distance: ArrayLike) -> Floats:
+        """Metres ``(…,)`` along the curve as it is."""
+        wanted = np.asarray(distance, dtype=np.float64)
+        inside = np.clip(wanted, 0.0, self.length).reshape(-1)
+        found = _looked_up((self.counted, self.metres, 1.0 / self.slower), inside)
+        # Before and after it, metres count as what they are.
+        return found.reshape(wanted.shape) + (wanted - np.clip(wanted, 0.0, self.length))
+
+    def of_curve(self, curve: Route) -> SlowedRoute:
+        """Another curve that is as long, and counts as longer in the same places."""
+        return SlowedRoute(
+            *(curve.controls, curve.breaks, curve.cyclic),
+            *(curve, self.metres, self.counted, self.slower),
+        )
+
+
+def slowed_in_bends(route: Route, *, stride: float, corner: float, amount: float) -> Route:
+    """The same route, on which a body that faces along it slows down in tight bends.
+
+    It is the same one if it has none.
+
+    Args:
+        route: where to, seen from above.
+        stride: metres that the body comes in a cycle of its gait.
+        corner: metres before and after a sharp corner within which it turns.
+        amount: 1 for as much as it takes, 0 for not at all.
+    """
+    route = route.bare
+    count = int(np.clip(np.ceil(_PER_STRIDE * route.length / stride), _FEWEST, _MOST))
+    metres = np.linspace(0.0, route.length, count + 1)
+    spacing = route.length / count
+    ways = route.tangent(past_joints(route.parameter_near(metres), route.breaks))
+    # Seen from above: a route that rises or falls turns as much less.
+    x, y = ways[:, 0], ways[:, 1]
+    across, onto = x[:-1] * y[1:] - y[:-1] * x[1:], x[:-1] * x[1:] + y[:-1] * y[1:]
+    level = np.hypot(across, onto)
+    turned = np.abs(np.arctan2(across, onto)) * level
+    first, last = (turned[-1], turned[0]) if route.cyclic else (turned[0], turned[-1])
+    around = np.concatenate([[first], turned, [last]])
+    rate = 0.5 * (around[1:] + around[:-1]) / spacing * stride / _TURNED
+    # A body turns before and after a corner, fastest in the middle.
+    width = np.hypot(corner, _EVEN * stride) / spacing
+    rate = np.maximum(evened(rate, width, cyclic=route.cyclic), 0.0)
+    if rate.max() <= _FROM:
+        return route
+    slower = 1.0 + amount * _beyond(rate)
+    steps = 0.5 * spacing * (slower[1:] + slower[:-1])
+    counted = np.concatenate([[0.0], np.cumsum(steps)])
+    return SlowedRoute(
+        *(route.controls, route.breaks, route.cyclic), *(route, metres, counted, slower)
+    )
+
+
+def _beyond(rate: Floats) -> Floats:
+    """By how much rates (…,) are beyond 1, which they come to be smoothly."""
+    width = _WHOLLY - _FROM
+    share = np.clip((rate - _FROM) / width, 0.0, 1.0)
+    # Its slope rises from 0 to 1; beyond that it goes straight on.
+    return 0.5 * width * share**2 + np.maximum(rate - _WHOLLY, 0.0)
