@@ -26,7 +26,7 @@ from tests.ui.rig import give_route, make_octopus
 NAMES = {
     *("along", "active_along", "begin_pose", "end_pose"),
     *("arms", "active_arm", "body_front", "body_up", "root_bone", "keep_pose"),
-    *("route", "spline", "speed_mode", "ease_in", "ease_out"),
+    *("route", "spline", "speed_mode", "slow_in_bends", "ease_in", "ease_out"),
     *("heading", "heading_angle", "keep_upright", "look_ahead", "corner"),
     *("height_mode", "height", "stand", "ground"),
     *("gait", "table", "contraction", "softness", "give", "steady", "sway", "phase_spread"),
