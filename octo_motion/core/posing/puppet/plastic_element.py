@@ -35,10 +35,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...rotations import Floats
+from ...rotations.small_batches import dot, turned, turned_back
 from .figure import Elements, Flags
 
 _TINY = 1e-60
-_ONES = np.ones(3)
 _UNIT = np.eye(3)
 
 
@@ -106,7 +106,7 @@ class ElementResponse:
         law = self.law
         slopes = self.slopes()
         at = law.speed_at(at_rest - self.trial) if speeds is None else speeds
-        right = (slopes @ at[:, :, None])[:, :, 0]
+        right = turned(slopes, at)
         right += law.step * self.load
         return slopes, right
 
@@ -167,7 +167,7 @@ class PlasticLaw:
         """The same from λ_e (joints, 3)."""
         if not self.can_flow:
             return ElementResponse(self, trial, trial)
-        size = np.sqrt((trial * trial) @ _ONES)
+        size = np.sqrt(dot(trial, trial))
         size += _TINY
         # With a threshold of 0 it flows even at rest: there its law is linear.
         pace = self._paces - self._least / size
@@ -201,8 +201,8 @@ class AxisLaw(PlasticLaw):
 
     def _along(self, factors: Floats, vectors: Floats) -> Floats:
         """Vectors (joints, 3), world, each times the factors (joints, 3) of its joint's axes."""
-        own = (self._back_turned @ vectors[:, :, None])[:, :, 0] * factors
-        return (self._frames @ own[:, :, None])[:, :, 0]
+        own = turned(self._back_turned, vectors) * factors
+        return turned(self._frames, own)
 
     def speed_at(self, change: Floats) -> Floats:
         mobility = np.divide(1.0, self._back, out=np.zeros_like(self._back), where=self._back > 0.0)
@@ -212,20 +212,20 @@ class AxisLaw(PlasticLaw):
         return self._along(-self._stiff, spring)
 
     def drawn(self, speed: Floats) -> Floats:
-        return (self.diagonal @ speed[:, :, None])[:, :, 0]
+        return turned(self.diagonal, speed)
 
     def respond(self, at_rest: Floats, speed: Floats) -> ElementResponse:
-        return self.answer(at_rest - (self.diagonal @ speed[:, :, None])[:, :, 0])
+        return self.answer(at_rest - turned(self.diagonal, speed))
 
     def answer(self, trial: Floats) -> ElementResponse:
-        size = np.sqrt((trial * trial) @ _ONES)
+        size = np.sqrt(dot(trial, trial))
         flows = (size >= self.yield_torque) & (size > 0.0) & self._can_flow
         which = flows.nonzero()[0]
         if not len(which):
             return ElementResponse(self, trial, trial)
         frames = self._frames.take(which, 0)
         back, limit = self._back.take(which, 0), self.yield_torque.take(which)[:, None]
-        own = (trial.take(which, 0)[:, None, :] @ frames)[:, 0]
+        own = turned_back(trial.take(which, 0), frames)
         whole = self._whole.take(which, 0)
         speed = _overstressed(own, whole, limit)
         way = own / (whole * speed + limit)
@@ -238,9 +238,9 @@ class AxisLaw(PlasticLaw):
             self.step * frames @ (back[:, :, None] * _UNIT - inner) @ frames.transpose(0, 2, 1)
         )
         flow = np.zeros_like(trial)
-        flow[which] = -(frames @ (speed * way)[:, :, None])[:, :, 0]
+        flow[which] = -turned(frames, speed * way)
         load = trial.copy()
-        load[which] -= (frames @ (back * speed * way)[:, :, None])[:, :, 0]
+        load[which] -= turned(frames, back * speed * way)
         return ElementResponse(self, load, trial, flows, flow=flow, bent=bent)
 
 

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...rotations import Floats, normalized, small_batches
+from ...rotations.small_batches import dot, turned, turned_back
 from ..puppet import Figure, Flags, Pose, pose_of
 from .tree import Tree
 
@@ -115,9 +116,9 @@ class Bodies:
 
     def kept_spin(self) -> Floats:
         """Angular momenta, shortened where the body's turn would have made energy of them."""
-        local = self.spin[:, None, :] @ self.matrices
-        now = ((local @ self._inverse_inertias) * local)[:, 0] @ _ONES
-        before = (self.spin * self.angular) @ _ONES
+        local = turned_back(self.spin, self.matrices)
+        now = dot(turned_back(local, self._inverse_inertias), local)
+        before = dot(self.spin, self.angular)
         share = np.maximum(before, 0.0) / (now + 1e-300)
         share = np.sqrt(np.minimum(share, 1.0))
         return self.spin * share[:, None]
@@ -126,7 +127,7 @@ class Bodies:
         """(bodies, 6) spatial velocities; ``skewed`` as in ``take_velocities``."""
         now = np.empty((len(self.linear), 6))
         now[:, :3] = self.angular
-        around = (skewed @ self.angular[:, :, None])[:, :, 0]
+        around = turned(skewed, self.angular)
         np.add(self.linear, around, out=now[:, 3:])
         return now
 
@@ -137,9 +138,9 @@ class Bodies:
         there.
         """
         self.angular = velocities[:, :3].copy()
-        self.linear = velocities[:, 3:] - (skewed @ self.angular[:, :, None])[:, :, 0]
-        local = self.angular[:, None, :] @ self.matrices
-        self.spin = (self.matrices @ (local @ self._figure.inertias).transpose(0, 2, 1))[:, :, 0]
+        self.linear = velocities[:, 3:] - turned(skewed, self.angular)
+        local = turned_back(self.angular, self.matrices)
+        self.spin = turned(self.matrices, turned_back(local, self._figure.inertias))
 
     def move(
         self,
@@ -157,7 +158,7 @@ class Bodies:
         vectors = turns if springs is None else np.concatenate([turns, -springs])
         turned = small_batches.from_rotation_vector(vectors)
         orientations = small_batches.multiply(turned[:count], self.orientations)
-        size = np.sqrt((orientations * orientations) @ _FOUR_ONES)
+        size = np.sqrt(dot(orientations, orientations))
         orientations /= size[:, None]
         self.orientations = orientations
         self.roots = self.roots + shifts
@@ -168,7 +169,5 @@ class Bodies:
 
 
 _CHANGING = ("roots", "orientations", "rest", "linear", "angular", "spin")
-_ONES = np.ones(3)
-_FOUR_ONES = np.ones(4)
 _UNIT = np.eye(3)
 _UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])

@@ -10,7 +10,6 @@ import numpy as np
 from ...rotations import Floats, small_batches
 from ..puppet import Figure, Integers, bends, slopes
 
-_ONES = np.ones(3)
 _ENDLESS = np.pi - 1e-9
 
 _NEAR = 0.1
@@ -88,7 +87,7 @@ class JointStops:
             return ()
         # In world axes: rows times the transposed frame of the bone at rest.
         seen = slopes(own) @ (frames[self.joints] @ self._axes).transpose(0, 2, 1)
-        sizes = np.sqrt((seen * seen) @ _ONES)[which, axis]
+        sizes = np.sqrt(small_batches.dot(seen, seen))[which, axis]
         rows = seen[which, axis] * (self._signs[side] / sizes[:, None])
         rates = np.maximum(gaps[which, side, axis] / (sizes * step), -_BACK)
         joints = self.joints[which]

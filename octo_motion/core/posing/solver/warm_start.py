@@ -8,6 +8,7 @@ from copy import copy
 import numpy as np
 
 from ...rotations import Floats
+from ...rotations.small_batches import dot
 from ..puppet import ElementResponse, Flags, Integers, PlasticLaw
 from .bodies import Bodies
 from .constraint_rows import RowImpulses, Rows
@@ -124,7 +125,7 @@ class ContactMemory:
         else:
             found, same = self._places(contacts)
             grips = self.grips.take(found, 0) * same
-        return grips - ((grips * normals) @ _ONES)[:, None] * normals
+        return grips - dot(grips, normals)[:, None] * normals
 
     def knows(self, contacts: Contacts) -> bool:
         """Whether these are the contacts of the step before."""
@@ -179,5 +180,4 @@ class ContactMemory:
 
 _NO_ROWS = np.zeros((0, 3))
 _NO_ONES = np.zeros(0)
-_ONES = np.ones(3)
 _NOBODY = np.zeros(0, np.int64)
