@@ -240,7 +240,8 @@ def bends(points: Floats) -> tuple[Floats, Floats]:
     joints = ends[:, :-1] / ends[:, -1:]
     places, angles = np.empty(len(points)), np.empty(len(points))
     for moment, (angle, joint) in enumerate(zip(turned, joints, strict=True)):
-        near = np.abs(joint[:, None] - joint) <= 0.5 * _STRETCH
+        # Joints on the edge of it are in it, whichever way they were rounded.
+        near = np.abs(joint[:, None] - joint) <= 0.5 * _STRETCH + 1e-6
         within = np.where(joint <= 1.0 - _STRETCH, near @ angle, 0.0)
         bend = near[int(np.argmax(within))]
         angles[moment] = within.max()

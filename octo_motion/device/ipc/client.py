@@ -242,8 +242,8 @@ class Client:
             self.calibrating.pop(message.pointer, None)
 
     def _forget_devices(self) -> None:
-        for each in (self.devices, self.pointers, self.calibrating, self.calibrated):
-            each.clear()
+        # New ones: the bridge may end under the hands of someone who goes through the old.
+        self.devices, self.pointers, self.calibrating, self.calibrated = {}, {}, {}, {}
 
     def _lose(self) -> None:
         """The bridge is gone: say so, and keep what it last said."""

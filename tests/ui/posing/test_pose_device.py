@@ -23,6 +23,7 @@ from octo_motion.device import messages as say
 from octo_motion.device.calibration import NONE, Calibration
 from octo_motion.device.driver import Kind
 from octo_motion.device.ipc.client import Client, ClientState
+from octo_motion.device.ipc.process import ChannelClosedError
 from octo_motion.ui.posing import device_pose
 from octo_motion.ui.posing.controls import Outcome
 from octo_motion.ui.posing.device_hands import NOTHING_NEAR, DeviceHands, NdofHands, ViewRoom
@@ -309,6 +310,28 @@ def test_killed_bridge_leaves_pose_and_keys_and_can_be_started_again(hands: Devi
     hands.recentre()
     wait(hands, hands.shown, "the hand is back")
     assert hands.client.state is ClientState.RUNNING
+
+
+def test_bridge_may_end_while_its_devices_are_told_of_the_view(
+    hands: DeviceHands, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wait(hands, hands.shown, "the hand is there")
+    assert hands.client._child
+
+    channel = hands.client._child.channel
+    send = channel.send
+
+    def ends(message: say.Message) -> None:
+        if isinstance(message, say.Workspace):
+            raise ChannelClosedError
+        send(message)
+
+    monkeypatch.setattr(channel, "send", ends)
+    hands.tick(TOLD, room(height=2.5))
+    assert hands.client.state is ClientState.LOST
+    assert [each.problem for each in hands.notices()] == [
+        "The program between Blender and the device has ended."
+    ]
 
 
 def test_bridge_that_is_started_again_knows_force_floor_and_calibration(
