@@ -24,7 +24,6 @@ from stage import Pixels, Points
 
 import octo_motion
 from octo_motion.ui.locomotion.operators import setups as ours
-from octo_motion.ui.locomotion.settings.body import BEFORE, BEFORE_BESIDE
 
 BUMPS: Final = 0.3
 """Height of the bumps from valley to top, in arm lengths."""
@@ -46,6 +45,8 @@ _IMPORTERS: Final = {
     ".glb": lambda path: bpy.ops.import_scene.gltf(filepath=path),
     ".fbx": lambda path: bpy.ops.import_scene.fbx(filepath=path),
 }
+_BY_ITSELF: Final = ("surge", "mantle", "siphon", "eyes", "head")
+"""Settings of what a body does."""
 _PHASES: Final = 3
 """Pictures of a body before, and as many after, beside each other."""
 _BACKGROUND: Final = (0.06, 0.06, 0.065)
@@ -176,10 +177,9 @@ def perform(
 
 def _still(settings: Any) -> None:
     """Leave the body to the arms that carry it, and all arms and cycles alike."""
-    for name, value in BEFORE_BESIDE.items():
-        setattr(settings, name, value)
-    for name, value in BEFORE.items():
-        setattr(settings.body, name, value)
+    settings.breathing = settings.uneven = 0.0
+    for name in _BY_ITSELF:
+        setattr(settings.body, name, 0.0)
 
 
 def _load(path: Path, name: str) -> bpy.types.Object:
