@@ -17,7 +17,7 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 WITHOUT_BLENDER = {"core", "device"}
-UNDER_THE_OLDER = {*WITHOUT_BLENDER, "blender", "bench"}
+UNDER_THE_OLDER = {*WITHOUT_BLENDER, "blender", "bench", "referee"}
 """Whose tests with the mark `one_blender` run under the older of two, where both run."""
 BESIDE_ANOTHER = "OCTO_MOTION_BESIDE_ANOTHER"
 """What `make test` sets where it tests two Blenders side by side."""

@@ -11,6 +11,8 @@ from tests.referee.recording import moments, record
 from tests.referee.scenes import build
 from tests.referee.surface import Surface
 
+pytestmark = pytest.mark.one_blender
+
 FARTHEST = 1.1136
 """Metres from the middle to either side, for an arm of 0.58 m."""
 
