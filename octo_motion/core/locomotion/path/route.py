@@ -533,7 +533,7 @@ def _check_joints(segments: Floats, cyclic: bool) -> None:  # noqa: FBT001
 _TURNED: Final = np.radians(50.0)
 """What a body turns by in a cycle of its gait at most, about. Eight arms are 45° apart, and hold on
 for half a cycle. Of 18 walks and hurries along hairpins, loops and ways of random turns, arms go
-through each other in none; at 60° in four, and in eleven without a limit."""
+through each other in none; at 60° in four, and in thirteen without a limit."""
 _FROM, _WHOLLY = 0.8, 1.2
 """Shares of that from which on a route begins to count as longer, and from which on it does so by
 all that it turns too fast. Where it turns by less than the first, nothing changes: at 0.5 ordinary
