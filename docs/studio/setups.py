@@ -46,7 +46,7 @@ _IMPORTERS: Final = {
     ".fbx": lambda path: bpy.ops.import_scene.fbx(filepath=path),
 }
 _BY_ITSELF: Final = ("surge", "mantle", "siphon", "eyes", "head")
-"""Settings of what a body does."""
+"""Settings of what a body does without being asked."""
 _PHASES: Final = 3
 """Pictures of a body before, and as many after, beside each other."""
 _BACKGROUND: Final = (0.06, 0.06, 0.065)

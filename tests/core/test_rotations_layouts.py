@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from octo_motion.core import rotations
-from octo_motion.core.rotations import components_first, normalized, rotate, scalars
+from octo_motion.core.rotations import components_first, normalized, rotate, scalars, small_batches
 
 
 @pytest.mark.parametrize("many", [1, 4, 12])
@@ -75,3 +75,17 @@ def test_scalars_do_the_same_as_arrays() -> None:
         (scalars.to_rotation_vector(one), rotations.to_rotation_vector(a)),
     ):
         np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("older", [False, True])
+def test_products_of_small_batches_are_those_of_each_pair(older: bool) -> None:  # noqa: FBT001
+    """With numpy's own calls, and with those that stand for them where numpy is older."""
+    names = ("vecdot", "matvec", "vecmat")
+    vecdot, matvec, vecmat = (getattr(small_batches, older * "_" + each) for each in names)
+    chance = np.random.default_rng(7)
+    wide, three, six = (chance.normal(size=(5, *each)) for each in ((3, 6), (3,), (6,)))
+    for row in range(5):
+        assert matvec(wide, six)[row] == pytest.approx(wide[row] @ six[row])
+        assert vecmat(three, wide)[row] == pytest.approx(three[row] @ wide[row])
+        assert vecdot(wide, wide[::-1])[row] == pytest.approx(np.diag(wide[row] @ wide[4 - row].T))
+        assert vecdot(six, six[::-1])[row] == pytest.approx(six[row] @ six[4 - row])

@@ -14,24 +14,24 @@ from .arrays import Floats
 _Of2: TypeAlias = Callable[[Floats, Floats], Floats]
 
 
-def _dot(first: Floats, second: Floats) -> Floats:
+def _vecdot(first: Floats, second: Floats) -> Floats:
     return np.einsum("...i,...i", first, second)
 
 
-def _turned(matrices: Floats, vectors: Floats) -> Floats:
+def _matvec(matrices: Floats, vectors: Floats) -> Floats:
     return (matrices @ vectors[:, :, None])[:, :, 0]
 
 
-def _turned_back(vectors: Floats, matrices: Floats) -> Floats:
+def _vecmat(vectors: Floats, matrices: Floats) -> Floats:
     return (vectors[:, None, :] @ matrices)[:, 0]
 
 
 # Each a single call, which numpy has since 2.2: Blender 4.5 comes with an older one.
-dot: Final[_Of2] = getattr(np, "vecdot", _dot)
+vecdot: Final[_Of2] = getattr(np, "vecdot", _vecdot)
 """Products ``a · b`` (…) of vectors (…, n)."""
-turned: Final[_Of2] = getattr(np, "matvec", _turned)
+matvec: Final[_Of2] = getattr(np, "matvec", _matvec)
 """Products ``M v`` (count, m) of matrices (count, m, n) and vectors (count, n)."""
-turned_back: Final[_Of2] = getattr(np, "vecmat", _turned_back)
+vecmat: Final[_Of2] = getattr(np, "vecmat", _vecmat)
 """Products ``v M``, or ``Mᵀ v`` (count, n), of vectors (count, m) and matrices (count, m, n)."""
 
 
@@ -64,7 +64,7 @@ def to_transforms(quaternions: Floats) -> tuple[Floats, Floats]:
 
 def from_rotation_vector(vectors: Floats) -> Floats:
     """Unit quaternions (count, 4) of rotation vectors (count, 3)."""
-    half = np.sqrt(dot(vectors, vectors))
+    half = np.sqrt(vecdot(vectors, vectors))
     half *= 0.5
     result = np.empty((len(vectors), 4))
     result[:, 0] = np.cos(half)
@@ -77,7 +77,7 @@ def from_rotation_vector(vectors: Floats) -> Floats:
 def to_rotation_vector(quaternions: Floats) -> Floats:
     """Rotation vectors (count, 3), at most π long, of unit quaternions (count, 4)."""
     imaginary = quaternions[:, 1:]
-    sine = np.sqrt(dot(imaginary, imaginary))
+    sine = np.sqrt(vecdot(imaginary, imaginary))
     real = quaternions[:, 0]
     factor = np.arctan2(sine, np.abs(real))
     # Where sine is 0 the vector is as well.

@@ -35,7 +35,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...rotations import Floats
-from ...rotations.small_batches import dot, turned, turned_back
+from ...rotations.small_batches import matvec, vecdot, vecmat
 from .figure import Elements, Flags
 
 _TINY = 1e-60
@@ -106,7 +106,7 @@ class ElementResponse:
         law = self.law
         slopes = self.slopes()
         at = law.speed_at(at_rest - self.trial) if speeds is None else speeds
-        right = turned(slopes, at)
+        right = matvec(slopes, at)
         right += law.step * self.load
         return slopes, right
 
@@ -167,7 +167,7 @@ class PlasticLaw:
         """The same from λ_e (joints, 3)."""
         if not self.can_flow:
             return ElementResponse(self, trial, trial)
-        size = np.sqrt(dot(trial, trial))
+        size = np.sqrt(vecdot(trial, trial))
         size += _TINY
         # With a threshold of 0 it flows even at rest: there its law is linear.
         pace = self._paces - self._least / size
@@ -201,8 +201,8 @@ class AxisLaw(PlasticLaw):
 
     def _along(self, factors: Floats, vectors: Floats) -> Floats:
         """Vectors (joints, 3), world, each times the factors (joints, 3) of its joint's axes."""
-        own = turned(self._back_turned, vectors) * factors
-        return turned(self._frames, own)
+        own = matvec(self._back_turned, vectors) * factors
+        return matvec(self._frames, own)
 
     def speed_at(self, change: Floats) -> Floats:
         mobility = np.divide(1.0, self._back, out=np.zeros_like(self._back), where=self._back > 0.0)
@@ -212,20 +212,20 @@ class AxisLaw(PlasticLaw):
         return self._along(-self._stiff, spring)
 
     def drawn(self, speed: Floats) -> Floats:
-        return turned(self.diagonal, speed)
+        return matvec(self.diagonal, speed)
 
     def respond(self, at_rest: Floats, speed: Floats) -> ElementResponse:
-        return self.answer(at_rest - turned(self.diagonal, speed))
+        return self.answer(at_rest - matvec(self.diagonal, speed))
 
     def answer(self, trial: Floats) -> ElementResponse:
-        size = np.sqrt(dot(trial, trial))
+        size = np.sqrt(vecdot(trial, trial))
         flows = (size >= self.yield_torque) & (size > 0.0) & self._can_flow
         which = flows.nonzero()[0]
         if not len(which):
             return ElementResponse(self, trial, trial)
         frames = self._frames.take(which, 0)
         back, limit = self._back.take(which, 0), self.yield_torque.take(which)[:, None]
-        own = turned_back(trial.take(which, 0), frames)
+        own = vecmat(trial.take(which, 0), frames)
         whole = self._whole.take(which, 0)
         speed = _overstressed(own, whole, limit)
         way = own / (whole * speed + limit)
@@ -238,9 +238,9 @@ class AxisLaw(PlasticLaw):
             self.step * frames @ (back[:, :, None] * _UNIT - inner) @ frames.transpose(0, 2, 1)
         )
         flow = np.zeros_like(trial)
-        flow[which] = -turned(frames, speed * way)
+        flow[which] = -matvec(frames, speed * way)
         load = trial.copy()
-        load[which] -= turned(frames, back * speed * way)
+        load[which] -= matvec(frames, back * speed * way)
         return ElementResponse(self, load, trial, flows, flow=flow, bent=bent)
 
 

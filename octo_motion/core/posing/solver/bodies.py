@@ -13,7 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...rotations import Floats, normalized, small_batches
-from ...rotations.small_batches import dot, turned, turned_back
+from ...rotations.small_batches import matvec, vecdot, vecmat
 from ..puppet import Figure, Flags, Pose, pose_of
 from .tree import Tree
 
@@ -116,9 +116,9 @@ class Bodies:
 
     def kept_spin(self) -> Floats:
         """Angular momenta, shortened where the body's turn would have made energy of them."""
-        local = turned_back(self.spin, self.matrices)
-        now = dot(turned_back(local, self._inverse_inertias), local)
-        before = dot(self.spin, self.angular)
+        local = vecmat(self.spin, self.matrices)
+        now = vecdot(vecmat(local, self._inverse_inertias), local)
+        before = vecdot(self.spin, self.angular)
         share = np.maximum(before, 0.0) / (now + 1e-300)
         share = np.sqrt(np.minimum(share, 1.0))
         return self.spin * share[:, None]
@@ -127,7 +127,7 @@ class Bodies:
         """(bodies, 6) spatial velocities; ``skewed`` as in ``take_velocities``."""
         now = np.empty((len(self.linear), 6))
         now[:, :3] = self.angular
-        around = turned(skewed, self.angular)
+        around = matvec(skewed, self.angular)
         np.add(self.linear, around, out=now[:, 3:])
         return now
 
@@ -138,9 +138,9 @@ class Bodies:
         there.
         """
         self.angular = velocities[:, :3].copy()
-        self.linear = velocities[:, 3:] - turned(skewed, self.angular)
-        local = turned_back(self.angular, self.matrices)
-        self.spin = turned(self.matrices, turned_back(local, self._figure.inertias))
+        self.linear = velocities[:, 3:] - matvec(skewed, self.angular)
+        local = vecmat(self.angular, self.matrices)
+        self.spin = matvec(self.matrices, vecmat(local, self._figure.inertias))
 
     def move(
         self,
@@ -158,7 +158,7 @@ class Bodies:
         vectors = turns if springs is None else np.concatenate([turns, -springs])
         turned = small_batches.from_rotation_vector(vectors)
         orientations = small_batches.multiply(turned[:count], self.orientations)
-        size = np.sqrt(dot(orientations, orientations))
+        size = np.sqrt(vecdot(orientations, orientations))
         orientations /= size[:, None]
         self.orientations = orientations
         self.roots = self.roots + shifts

@@ -141,4 +141,4 @@ class CarriedWorld(World):
         springs = super()._springs_after(problem, solution)
         assert self._driven is not None
         led = self.settings.step * self._driven
-        return springs - small_batches.turned_back(led, self._bodies.parent_matrices)
+        return springs - small_batches.vecmat(led, self._bodies.parent_matrices)

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...rotations import Floats
-from ...rotations.small_batches import dot, skew, turned
+from ...rotations.small_batches import matvec, skew, vecdot
 from ..puppet import Flags, Integers
 from .contact_detection import Contacts
 
@@ -117,7 +117,7 @@ class Tangent:
         if self.planes is None:
             assert self.shares is not None
             return self.shares[:, None] * wanted
-        result = turned(self.planes, wanted)
+        result = matvec(self.planes, wanted)
         return result if self.rest is None else result + self.rest
 
     def blocks(self) -> Floats:
@@ -272,14 +272,14 @@ class Rows:
         own = velocities.take(self.bodies, 0)
         if len(self.paired):
             own[self.paired] -= velocities[self.others[self.paired]]
-        return turned(self.reach, own)
+        return matvec(self.reach, own)
 
     def slip(self, answer: RowImpulses) -> Floats:
         """(contacts,) μ |w_t|, m/s: what slipping as then adds to the rates."""
         if self._slip_of is not answer:
             # y_t = b − a w_t.
             apart = answer.across if self.grips is None else answer.across - self.grips
-            self._slip = self.pattern.slipping * np.sqrt(dot(apart, apart))
+            self._slip = self.pattern.slipping * np.sqrt(vecdot(apart, apart))
             self._slip_of = answer
         return self._slip
 
@@ -288,8 +288,8 @@ class Rows:
         normals, w = self.contacts.normals, self.speeds(velocities)[: self.count]
         if self.contacts.speeds is not None:
             w = w - self.contacts.speeds
-        across = w - dot(w, normals)[:, None] * normals
-        return self.pattern.friction * np.sqrt(dot(across, across))
+        across = w - vecdot(w, normals)[:, None] * normals
+        return self.pattern.friction * np.sqrt(vecdot(across, across))
 
     def follow(self, slip: Floats, tolerance: float) -> bool:
         """Take over μ |w_t| (contacts,); false where that changes no rate by ``tolerance``, m/s."""
@@ -312,7 +312,7 @@ class Rows:
         if holds is None:
             return RowImpulses(wanted, impulses, *self._touch(wanted, impulses), _NO_ONES)
         pulls = wanted[count:]
-        square, held = dot(pulls, pulls), self.pattern.unbound
+        square, held = vecdot(pulls, pulls), self.pattern.unbound
         full = bool(np.count_nonzero(square > holds.bounds * holds.bounds))
         if full:
             held = np.minimum(holds.bounds / (np.sqrt(square) + _TINY), 1.0)
@@ -327,9 +327,9 @@ class Rows:
     def _touch(self, y: Floats, impulses: Floats) -> _Touch:
         """Contacts' impulses (contacts, 3) at y, and what ``RowImpulses`` tells of them."""
         normals, friction = self.contacts.normals, self.pattern.friction
-        push = dot(y, normals)
+        push = vecdot(y, normals)
         across = y - push[:, None] * normals
-        size = np.sqrt(dot(across, across))
+        size = np.sqrt(vecdot(across, across))
         # Less, not equal: without friction nothing sticks, and what is apart is not drawn.
         sticks = size < friction * push
         lift = push + friction * size
@@ -365,7 +365,7 @@ class Rows:
             if full:
                 pulls = answer.impulses[count:]
                 # Not by the bound: it may have changed since.
-                way = pulls / (np.sqrt(dot(pulls, pulls)) + _TINY)[:, None]
+                way = pulls / (np.sqrt(vecdot(pulls, pulls)) + _TINY)[:, None]
                 part = np.where(held < 1.0, held, 0.0)[:, None] * way
                 planes[count:] -= part[:, :, None] * way[:, None, :]
                 rest = np.zeros((len(self), 3))
@@ -409,7 +409,7 @@ class Rows:
         if off:
             assert errors is not None
             speed = 0.2 / step * errors
-            length = np.sqrt(dot(speed, speed)) + _TINY
+            length = np.sqrt(vecdot(speed, speed)) + _TINY
             result[count:] = speed * np.minimum(fastest / length, 1.0)[:, None]
         return result
 

@@ -87,7 +87,7 @@ class JointStops:
             return ()
         # In world axes: rows times the transposed frame of the bone at rest.
         seen = slopes(own) @ (frames[self.joints] @ self._axes).transpose(0, 2, 1)
-        sizes = np.sqrt(small_batches.dot(seen, seen))[which, axis]
+        sizes = np.sqrt(small_batches.vecdot(seen, seen))[which, axis]
         rows = seen[which, axis] * (self._signs[side] / sizes[:, None])
         rates = np.maximum(gaps[which, side, axis] / (sizes * step), -_BACK)
         joints = self.joints[which]

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...rotations import Floats
-from ...rotations.small_batches import turned
+from ...rotations.small_batches import matvec
 from ..puppet import ElementResponse
 from .constraint_rows import Flags, Pattern, RowImpulses, Rows, Tangent
 from .joint_stops import Stops
@@ -303,7 +303,7 @@ class Newton:
         """
         joint_way = end.joint_speeds - start.joint_speeds
         body_way = end.velocities - start.velocities
-        mass = float((body_way * turned(problem.spatial, body_way)).sum())
+        mass = float((body_way * matvec(problem.spatial, body_way)).sum())
         pull = float((joints * joint_way).sum())
         row_way = _NO_ROWS
         if rows is not None:
@@ -409,7 +409,7 @@ def _predicted(tangents: _Tangents, end: Iterate) -> tuple[Floats, Floats | None
     """Impulses at the end by the tangents: joints (bodies, 3), rows (rows, 3)."""
     joints, rows = end.joint_impulses, None
     if not (tangents.linear and end.response.flows is None):
-        joints = tangents.right - turned(tangents.slopes, end.joint_speeds)
+        joints = tangents.right - matvec(tangents.slopes, end.joint_speeds)
     if end.rows is not None:
         assert tangents.rows is not None
         rows = end.rows.impulses

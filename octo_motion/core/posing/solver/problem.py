@@ -14,7 +14,7 @@ import numpy as np
 
 from ...rotations import Floats
 from ...rotations.scalars import Vector
-from ...rotations.small_batches import skew, turned
+from ...rotations.small_batches import matvec, skew
 from ..puppet import Figure, PlasticLaw, part_of
 from .bodies import Bodies
 from .constraint_rows import Rows
@@ -150,7 +150,7 @@ class ProblemBuilder:
         if np.count_nonzero(forces):
             linear += h * forces[:, :3]
             momenta[:, :3] = h * forces[:, 3:]
-        momenta[:, :3] += turned(skewed, linear)
+        momenta[:, :3] += matvec(skewed, linear)
         momenta[:, :3] += bodies.kept_spin()
         if self._kept is not None:
             momenta *= self._kept

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...rotations import Floats
-from ...rotations.small_batches import skew, turned_back
+from ...rotations.small_batches import skew, vecmat
 from ..puppet import Figure, Flags, Integers
 
 
@@ -180,7 +180,7 @@ class Tree:
 
     def velocities(self, speeds: Floats) -> Floats:
         """V (bodies, 6) of u (slots, 3)."""
-        return self.chain @ turned_back(speeds, self.motion)
+        return self.chain @ vecmat(speeds, self.motion)
 
     def from_roots(self, values: Floats) -> Floats:
         """(bodies, numbers) sums over each body and all between it and the world."""

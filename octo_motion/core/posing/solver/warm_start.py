@@ -8,7 +8,7 @@ from copy import copy
 import numpy as np
 
 from ...rotations import Floats
-from ...rotations.small_batches import dot
+from ...rotations.small_batches import vecdot
 from ..puppet import ElementResponse, Flags, Integers, PlasticLaw
 from .bodies import Bodies
 from .constraint_rows import RowImpulses, Rows
@@ -125,7 +125,7 @@ class ContactMemory:
         else:
             found, same = self._places(contacts)
             grips = self.grips.take(found, 0) * same
-        return grips - dot(grips, normals)[:, None] * normals
+        return grips - vecdot(grips, normals)[:, None] * normals
 
     def knows(self, contacts: Contacts) -> bool:
         """Whether these are the contacts of the step before."""

@@ -21,15 +21,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import SettingsError
-from ...rotations import (
-    IDENTITY,
-    Floats,
-    conjugate,
-    multiply,
-    normalized,
-    rotate,
-    small_batches,
-)
+from ...rotations import IDENTITY, Floats, conjugate, multiply, normalized, rotate
+from ...rotations.small_batches import vecdot, vecmat
 from ..puppet import Elements, Figure, Flags, Pose, law_of, part_of
 from .bodies import Bodies
 from .constraint_rows import Pattern, Rows
@@ -345,7 +338,7 @@ class World:
         if not self.obstacles and self._detector.idle:
             return NO_CONTACTS
         linear = bodies.linear
-        fastest = float(small_batches.dot(linear, linear).max()) ** 0.5
+        fastest = float(vecdot(linear, linear).max()) ** 0.5
         margin = 2e-3 * self._size + 2.0 * self.settings.step * fastest
         return self._detector.find(bodies.positions, bodies.matrices, self.obstacles, margin)
 
@@ -374,7 +367,7 @@ class World:
         springs = solution.joint_speeds - solution.response.flows_with()
         springs *= self.settings.step
         springs += problem.springs
-        return small_batches.turned_back(springs, self._bodies.parent_matrices)
+        return vecmat(springs, self._bodies.parent_matrices)
 
     def _use_elements(self) -> None:
         works = ~self._bodies.is_root
