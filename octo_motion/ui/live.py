@@ -28,9 +28,9 @@ SOON: Final = 0.0
 """Seconds from a change to the frame in sight at least: what changes together is told together."""
 IDLE: Final = 0.1
 """Seconds without a change after which all other frames follow …"""
-TURN: Final = 0.002
-"""… and for how long at a time, before a step of the work that has begun is let end: it takes about
-as long again."""
+TURN: Final = 0.001
+"""… and for how long at a time, before a step of the work that has begun is let end: that may take
+five times as long, and so has to be the last."""
 LATER: Final = 0.3
 """Seconds until it is tried again, while Blender renders or a tool of ours runs."""
 

@@ -155,7 +155,7 @@ def _places() -> dict[str, list[Place]]:
         "solve (CCD)": [(generator, "solving_ccd"), (generator, "asked_shape")],
         "joints to bone rotations": [(generator, "rotate_bones")],
         "lay down what holds on": [(walk.GroundedWalk, "posing")],
-        "let turns take their time": [(computing, "_take_time")],
+        "let turns take their time": [(computing, "_taking_time")],
         "body, mantle, siphon, eyes": [(planning, "_self_moving"), (computing, "organs_at")],
         "off the ground between frames": [(computing, "_clearing")],
         "keep arms apart": [(computing, "_separate")],

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import deque
-from collections.abc import Collection, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from operator import is_not, itemgetter
@@ -60,6 +60,8 @@ _CURVES_AT_ONCE: Final = 50
 """How many are read at one step to see whether they have been edited."""
 _TOLD_AT_ONCE: Final = 20
 """How many Blender looks at anew at one step: after each of them it works the frame out again."""
+_LOOKED_AT_AT_ONCE: Final = 40
+"""How many channels it is looked at in one step whether they are what they are to be."""
 _LEAST_SPACING: Final = 0.01
 """Blender takes keys that are no further apart, in frames, for one and the same."""
 
@@ -571,8 +573,26 @@ class _Written:
         anew, so that their colours, selection and place in the editors stay, but for those that
         were so already.
         """
-        digests, handles = self.digests, self.handles
         curves = {(curve.data_path, curve.array_index): curve for curve in channelbag.fcurves}
+        yield from self.filling_some(
+            channelbag, curves, times, channels, filled, automatic=automatic
+        )
+        # A group goes with the last of its curves.
+        for curve in curves.values():
+            channelbag.fcurves.remove(curve)
+
+    def filling_some(
+        self,
+        channelbag: bpy.types.ActionChannelbag,
+        curves: dict[tuple[str, int], bpy.types.FCurve],
+        times: np.ndarray,
+        channels: Sequence[Channel],
+        filled: Mapping[tuple[str, int], _Filled],
+        *,
+        automatic: bool,
+    ) -> Iterator[None]:
+        """The same of some of the curves, which are taken out of those that are there."""
+        digests, handles = self.digests, self.handles
         # Everything goes through the same few buffers: memory stays modest, however many the bones.
         points, kinds = _dense_keys(times, automatic=automatic)
         for channel in channels:
@@ -607,9 +627,6 @@ class _Written:
                 if own_handles is not None:
                     handles[place] = own_handles
             yield
-        for curve in curves.values():
-            # Its group goes with the last of its curves.
-            channelbag.fcurves.remove(curve)
 
 
 def _dense_keys(times: np.ndarray, *, automatic: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -663,6 +680,8 @@ class HalfWritten:
         self._channels: Sequence[Channel] = ()
         self._range = {name: getattr(action, name) for name in _RANGE}
         self._before: dict[tuple[str, int], dict[str, np.ndarray]] = {}
+        self._new: set[tuple[str, int]] = set()
+        """Curves that were not there before."""
         self._fingerprint: str = action[MARK]["fingerprint"]
         action[MARK]["fingerprint"] = _BEING_WRITTEN
 
@@ -691,6 +710,13 @@ class HalfWritten:
         self._written, self._channels = None, list(channels)
         times = _checked(frames, channels)
         points, kinds = _dense_keys(times, automatic=automatic)
+
+        def fill(curve: bpy.types.FCurve, channel: Channel, component: int) -> _Filled:
+            if channel.keys is not None:
+                return _fill_bezier(curve, channel.keys, component)
+            points[:, 1] = channel.values[:, component]
+            return _fill_dense(curve, points, kinds)
+
         for start in range(0, len(channels), CHANNELS_AT_ONCE):
             yield
             curves = self._curves()
@@ -702,16 +728,12 @@ class HalfWritten:
                         continue
                     if not seen and len(curve.keyframe_points) != count:
                         continue
-                    if place not in self._before:
+                    if place not in self._before and place not in self._new:
                         self._before[place] = _read_keys(curve)
-                    own = _are_own_handles(self._before[place])
-                    if channel.keys is not None:
-                        found = _fill_bezier(curve, channel.keys, component)
-                    else:
-                        points[:, 1] = channel.values[:, component]
-                        found = _fill_dense(curve, points, kinds)
+                    own = place in self._before and _are_own_handles(self._before[place])
+                    found = fill(curve, channel, component)
                     self.curves[place] = replace(found, had_own_handles=own)
-        yield from self._telling(channels)
+        yield from self._telling(channels, fill)
         yield from self._ending(times, channels, automatic=automatic, repeats=repeats)
 
     def _ending(
@@ -722,12 +744,21 @@ class HalfWritten:
         told = len(self.curves) == count and all(each.told for each in self.curves.values())
         if not told or repeats != self._range["use_cyclic"]:
             return
+        written = _Written()
+        for start in range(0, len(channels), _LOOKED_AT_AT_ONCE):
+            yield
+            if (action := bpy.data.actions.get(self.name)) is None:
+                return
+            own = _dense_channelbag(action), self._curves(), times
+            some = channels[start : start + _LOOKED_AT_AT_ONCE]
+            deque(written.filling_some(*own, some, self.curves, automatic=automatic), maxlen=0)
         yield
         if (action := bpy.data.actions.get(self.name)) is None:
             return
-        channelbag, written = _dense_channelbag(action), _Written()
-        known = self.curves
-        deque(written.filling(channelbag, times, channels, known, automatic=automatic), maxlen=0)
+        channelbag = _dense_channelbag(action)
+        for place, curve in self._curves().items():
+            if place not in self.curves:
+                channelbag.fcurves.remove(curve)
         _set_range(action, channelbag, times, repeats=repeats)
         yield
         if (action := bpy.data.actions.get(self.name)) is not None:
@@ -735,25 +766,50 @@ class HalfWritten:
             self._written = written
         yield
 
-    def _telling(self, channels: Sequence[Channel]) -> Iterator[None]:
+    def _telling(
+        self,
+        channels: Sequence[Channel],
+        fill: Callable[[bpy.types.FCurve, Channel, int], _Filled],
+    ) -> Iterator[None]:
         """Let Blender look at what is filled, in steps: at the first of them all is seen that was
-        filled, and has to be all that there is; handles, which are put right, count between keys.
+        filled, and has to be all that there is, curves that come new too; handles, which are put
+        right, count between keys.
         """
         places = {
             (channel.data_path, component): channel
             for channel in channels
             for component in range(channel.values.shape[1])
         }
-        if self.curves.keys() != places.keys():
+        missing = places.keys() - self.curves.keys()
+        if not self.curves or not missing.isdisjoint(self._curves()):
             return
-        known = list(places.items())
+        known = [(place, channel) for place, channel in places.items() if place not in missing]
         for start in range(0, len(known), _TOLD_AT_ONCE):
             yield
+            if start == 0:
+                self._add({place: places[place] for place in places if place in missing}, fill)
             curves = self._curves()
             for place, channel in known[start : start + _TOLD_AT_ONCE]:
                 if (curve := curves.get(place)) is not None:
                     handles = _tell(curve, channel)
                     self.curves[place] = replace(self.curves[place], handles=handles, told=True)
+
+    def _add(
+        self,
+        missing: Mapping[tuple[str, int], Channel],
+        fill: Callable[[bpy.types.FCurve, Channel, int], _Filled],
+    ) -> None:
+        """Make the curves that are not there, of which Blender is told."""
+        action = bpy.data.actions.get(self.name)
+        if action is None:
+            return
+        channelbag = _dense_channelbag(action)
+        for (path, component), channel in missing.items():
+            curve, place = channelbag.fcurves.new(path, index=component), (path, component)
+            self._new.add(place)
+            curve.group = group_named(channelbag, channel.group)
+            found = fill(curve, channel, component)
+            self.curves[place] = replace(found, handles=_tell(curve, channel), told=True)
 
     def give_back(self) -> None:
         """Let the action be as it was."""
@@ -761,6 +817,8 @@ class HalfWritten:
         if action is None or not self._before:
             return
         curves = self._curves()
+        for place in self._new & curves.keys():
+            _dense_channelbag(action).fcurves.remove(curves.pop(place))
         for place, keys in self._before.items():
             curve = curves.get(place)
             if curve is not None:

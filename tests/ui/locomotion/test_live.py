@@ -734,6 +734,72 @@ def test_a_curve_muted_on_the_last_step_stays_so_and_the_action_is_the_artists(s
     assert actions.is_edited(action)
 
 
+@pytest.fixture
+def stiff(slowly: Any) -> Any:
+    """The same, on arms that do not stretch: they get new curves once they do."""
+    for bone in slowly.data.bones:
+        bone.inherit_scale = "ALIGNED"
+    settings_of(slowly).ground.stretch = 0.0
+    slowly.update_tag(refresh={"OBJECT"})
+    settle()
+    assert not any(path.endswith("scale") for path, _ in motion(slowly))
+    settings_of(slowly).ground.stretch = 0.2
+    return slowly
+
+
+def test_curves_that_come_new_come_with_the_first_that_is_seen_and_no_more_is_left_to_the_end(
+    stiff: Any,
+) -> None:
+    before = motion(stiff)
+    stiff.update_tag(refresh={"OBJECT"})
+    bpy.context.view_layer.update()
+    live.run_pending()
+    as_planned(stiff)
+    name, work = as_written(stiff)
+    shown, most, turns = seen(stiff), 4 * actions.CHANNELS_AT_ONCE, 0
+    while (half := work.motion.shown.half) is None or half.all_of(half._channels) is None:
+        last = motion(stiff)
+        live._state.go_on(name, 0.0)
+        now = motion(stiff)
+        turns += now.keys() != last.keys()
+        assert sum(now[place] != last[place] for place in last.keys() & now.keys()) <= most
+        bpy.context.view_layer.update()
+        assert apart(seen(stiff), shown) < 1e-6
+    assert turns == 1
+    assert any(path.endswith("scale") for path, _ in motion(stiff).keys() - before.keys())
+    live.finish_following()
+    followed = motion(stiff)
+    assert not actions.is_edited(action_of(stiff))
+    generate(stiff)
+    assert motion(stiff) == followed
+
+
+def test_curves_that_came_new_go_again_where_the_action_is_given_back(stiff: Any) -> None:
+    before = motion(stiff)
+    all_but_written(stiff)
+    assert motion(stiff).keys() > before.keys()
+    settings_of(stiff).live = False
+    live.finish_following()
+    assert motion(stiff) == before
+    assert not actions.is_edited(action_of(stiff))
+
+
+def test_bones_that_come_to_pass_their_scale_on_otherwise_are_followed(octopus: Any) -> None:
+    def aligned(*, stretched: bool) -> bool:
+        for bone in octopus.data.bones:
+            bone.inherit_scale = "ALIGNED" if stretched else "FULL"
+        settle()
+        return any(path.endswith("scale") for path, _ in motion(octopus))
+
+    settings_of(octopus).frame_end = 400
+    assert not aligned(stretched=False)
+    assert aligned(stretched=True)
+    followed = motion(octopus)
+    generate(octopus)
+    assert motion(octopus) == followed
+    assert not aligned(stretched=False)
+
+
 def few_on_their_way(armature: Any) -> dict[Any, Any]:
     """Go on until a motion with a key on every frame is about to get few; its keys."""
     settings_of(armature).keys = "REDUCED"

@@ -685,15 +685,15 @@ def afloat(swims: Sequence[bool], shares: Sequence[Floats]) -> Floats:
     return result
 
 
-def keep_off_ground(
+def keeping_off_ground(
     course: ArmsOverGround,
     poses: Poses,
     radii: Sequence[Floats],
     loose: Floats,
     *,
     closer: float = 0.0,
-) -> Floats:
-    """Rotations (frames, bones, 4) of the same arms off the ground.
+) -> Generator[None, None, Floats]:
+    """Rotations (frames, bones, 4) of the same arms off the ground, in steps.
 
     Radii are metres from each joint (joints,) of an arm to the skin below it, or for all frames
     (frames, joints); ``loose`` (frames, arms) is how far each is to be raised, 0…1. They may come
@@ -732,4 +732,5 @@ def keep_off_ground(
         moved = np.any(np.abs(after - before) > 1e-12, axis=(1, 2))
         higher = multiply(shortest_arc(before[moved], after[moved]), frames[moved])
         result[chosen[moved], bones] = arm.to_bones(higher)
+        yield
     return result

@@ -8,7 +8,7 @@ leaves, until it is its turn: then it steps over.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -29,7 +29,7 @@ from ...rotations import (
 )
 from ...smoothing import least_jerk, smooth_step
 from ..body import OrganPoses
-from ..clearance import ArmsOverGround, keep_off_ground
+from ..clearance import ArmsOverGround, keeping_off_ground
 from ..ground import Ground, drawn
 from ..path import blend_motions
 from ..rig import ArmFrames, ArmMotion, BodyFrame, Poses
@@ -164,8 +164,10 @@ class ArmsAround:
     they do not."""
 
 
-def hand_over_arms(hands: Iterable[Handover], arms: ArmMotion, around: ArmsAround) -> None:
-    """Let arms, which are changed, go over between their motion and poses."""
+def handing_over_arms(
+    hands: Iterable[Handover], arms: ArmMotion, around: ArmsAround
+) -> Generator[None, None, None]:
+    """Let arms, which are changed, go over between their motion and poses; in steps."""
     creature, frames, going, ground = around.creature, around.frames, around.going, around.ground
     names = [name for bones in creature.bones for name in bones]
     ends = np.cumsum([0, *(len(bones) for bones in creature.bones)])
@@ -203,7 +205,8 @@ def hand_over_arms(hands: Iterable[Handover], arms: ArmMotion, around: ArmsAroun
         if ground is not None:
             course = ArmsOverGround(frames, ground[0], creature.scale)
             radii = _raised(ground[1], creature.scale, lifts * _bump(shares))
-            turned = keep_off_ground(course, Poses(turned, strains, *where), radii, _bump(shares))
+            poses = Poses(turned, strains, *where)
+            turned = yield from keeping_off_ground(course, poses, radii, _bump(shares))
         arms.rotations[chosen], arms.strains[chosen] = turned, strains
         gone = shares < 1.0
         for number in range(len(frames)):
@@ -213,6 +216,7 @@ def hand_over_arms(hands: Iterable[Handover], arms: ArmMotion, around: ArmsAroun
                 arms.in_contact[number][chosen[gone[:, number]]] = False
         rows, columns = np.nonzero(gone)
         arms.late[chosen[rows], columns] = arms.misses[chosen[rows], columns] = 0.0
+        yield
         arms.cycles[chosen[rows], columns] = -_UNHEARD + hand.moment
 
 

@@ -17,13 +17,14 @@ from ...keyframes import Channel
 from ...phrases import phrase
 from ...rotations import IDENTITY, Floats, conjugate, from_matrix, multiply, rotate, slerp
 from ...smoothing import covered, smooth_step
+from ...steps import evenly
 from ..body import BodyMoments, OrganPoses, carriages, pose_organs
 from ..clearance import (
     ArmsOverGround,
     BodyVolume,
     Haste,
     Opened,
-    keep_off_ground,
+    keeping_off_ground,
     lead_past,
     raising_between_frames,
     separating_arms,
@@ -37,14 +38,14 @@ from ..rig import (
     MARGIN,
     ArmMotion,
     Poses,
-    eased_turns,
+    easing_turns,
     fastest_turn,
     halfway_automatic,
+    keeping_where_it_helps,
     object_transforms,
     root_bone_transforms,
     turn_limits,
     turns_in_world,
-    where_it_helps,
 )
 from .carrying import Carry, Laid, carried
 from .few_keys import Motion, measuring_keyed, reduced
@@ -54,9 +55,9 @@ from .handover import (
     eased_places,
     eased_stay,
     further_channels,
-    hand_over_arms,
     hand_over_organs,
     hand_over_stretch,
+    handing_over_arms,
     handovers,
     near_enough,
 )
@@ -211,7 +212,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     if trailing is not None:
         yield from scaled(_trail(plan, trailing, posed), _TRAILING * moving, moving)
     if posed.hands:
-        _hand_over(plan, posed)
+        yield from evenly(_handing_over(plan, posed), moving)
     yield moving
     arms, keyed, reached = posed.arms, posed.keyed, posed.reached
     organs = organs_at(plan, moments, keyed, posed.swimming)
@@ -350,12 +351,15 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     volume = _volume_at(plan, times, keyed, swimming)
     yield 0.94
     # What is reached for is in the world.
-    reached = _reach(plan, arms, volume, keyed, going) if plan.carry is None else None
+    reached = None
+    if plan.carry is None:
+        reached = yield from evenly(_reaching(plan, arms, volume, keyed, going), 0.94)
     yield 0.96
     making_way = _separate(plan, arms, reached, going, volume, swimming=swimming, cyclic=cyclic)
     warnings = yield from scaled(making_way, 0.96, 0.98)
     yield 0.98
-    turning = _take_time(plan, arms, reached, going, cyclic=cyclic)
+    taking_time = _taking_time(plan, arms, reached, going, cyclic=cyclic)
+    turning = yield from evenly(taking_time, 0.98)
     if hands or job.in_place or job.body.trailing is not None or plan.carry is not None:
         # What plays is another motion yet.
         turning = None
@@ -363,7 +367,7 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     if plan.carry is not None:
         planned, arms = (arms, going), arms.copy()
         going = keyed = _carried(plan, plan.carry, arms, going, (travel.distance, times))
-        reached = _reach(plan, arms, volume, keyed, going)
+        reached = yield from evenly(_reaching(plan, arms, volume, keyed, going), 0.99)
         eased = _body_of(creature, going)
         eased = eased_places(hands, creature.body, creature.scale, eased)
     else:
@@ -397,15 +401,17 @@ def _handovers(plan: MotionPlan, times: Floats) -> list[Handover]:
     return handovers(plan.job.begin, plan.job.end, frames, ends)
 
 
-def _hand_over(plan: MotionPlan, posed: _Posed) -> None:
-    """Let arms go over between their motion and poses; in place there is nothing to stand on."""
+def _handing_over(plan: MotionPlan, posed: _Posed) -> Generator[None, None, None]:
+    """Let arms go over between their motion and poses, in steps; in place there is nothing to stand
+    on.
+    """
     creature, ground = plan.job.creature, _underfoot(plan)
     frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
     below = None
     if ground is not None and not plan.job.in_place and plan.carry is None:
         below = ground, _radii(plan)
     around, arms = ArmsAround(creature, frames, posed.going, below), posed.arms
-    hand_over_arms(posed.hands, arms, around)
+    yield from handing_over_arms(posed.hands, arms, around)
     if plan.carry is not None:
         return
     # Far from its pose an arm may have to be elsewhere at once: it sets out earlier, as in a walk.
@@ -425,7 +431,7 @@ def _hand_over(plan: MotionPlan, posed: _Posed) -> None:
         joints = course.joints(Poses(arms.rotations[here], arms.strains[here], *where))
         deep = smooth_step(-course.clear(joints) / _DEEP)
         above *= 1.0 - deep * (1.0 - hand.share)[:, None]
-    _give_time(plan, arms, posed.going, held, limits, above=above, cyclic=False)
+    yield from _giving_time(plan, arms, posed.going, held, limits, above=above, cyclic=False)
     arms.rotations[ends] = before[ends]
 
 
@@ -470,7 +476,7 @@ def glimpse(plan: MotionPlan, frame: float) -> Steps[Glimpse]:
     first, last = max(middle - around, 0), middle + around + 1
     posed = yield from _posed(plan, times[first:last], 2 * around + 1, cyclic=False)
     if posed.hands:
-        _hand_over(plan, posed)
+        yield from evenly(_handing_over(plan, posed), 1.0)
     yield 1.0
     organs = organs_at(plan, moments[first:last], posed.keyed, posed.swimming)
     yield 1.0
@@ -605,12 +611,13 @@ def _clearing(
     course = ArmsOverGround(frames, ground, creature.scale, cyclic=cyclic)
     loose = plan.segments.afloat(made.travel.distance)
 
-    def kept_off(poses: Poses, share: Floats | None) -> Poses:
-        """The same with arms off the ground that know of none."""
+    def keeping_off(poses: Poses, share: Floats | None) -> Generator[None, None, Poses]:
+        """The same with arms off the ground that know of none, in steps."""
         if share is None:
             return poses
         radii = [creature.scale * each for each in _radii(plan)]
-        return replace(poses, rotations=keep_off_ground(course, poses, radii, share))
+        rotations = yield from keeping_off_ground(course, poses, radii, share)
+        return replace(poses, rotations=rotations)
 
     def again(
         chosen: np.ndarray, lift: Floats
@@ -619,10 +626,10 @@ def _clearing(
         higher, joints = yield from made.higher(chosen, lift)
         arms.late[chosen] = higher.late
         poses = Poses(higher.rotations, higher.strains, going[0][chosen], going[1][chosen])
-        poses = kept_off(poses, None if loose is None else loose[chosen])
+        poses = yield from keeping_off(poses, None if loose is None else loose[chosen])
         return poses, joints if joints is not None else course.joints(poses)
 
-    whole = kept_off(Poses(arms.rotations, arms.strains, *going), loose)
+    whole = yield from keeping_off(Poses(arms.rotations, arms.strains, *going), loose)
     yield
     if not plan.standing:
         # Nothing lies on the ground, so there is nothing to raise between frames.
@@ -657,14 +664,14 @@ def _volume(plan: MotionPlan, volume: BodyVolume, organs: OrganPoses) -> BodyVol
     return volume.carried(carriages(organs, plan.job.creature.skeleton, names), wider)
 
 
-def _reach(
+def _reaching(
     plan: MotionPlan,
     arms: ArmMotion,
     volume: BodyVolume | None,
     keyed: Travelled,
     going: Travelled,
-) -> Reached | None:
-    """Let arms reach, past each other and the ground; none where nothing is reached for.
+) -> Generator[None, None, Reached | None]:
+    """Let arms reach, past each other and the ground; none where nothing is reached for. In steps.
 
     Arms which reach hold no ground and follow no gait.
     """
@@ -676,7 +683,8 @@ def _reach(
     heights = ground.height if ground is not None else None
     travelling = Travelling(*keyed, creature.scale, heights)
     reached = reaching.apply(plan.schedule.frames, arms.rotations, travelling, arms.strains)
-    _led_past(plan, arms, reached, volume, going)
+    yield
+    yield from _leading_past(plan, arms, reached, volume, going)
     moved = np.any(arms.rotations != before, axis=-1)
     for number, bones in enumerate(plan.segments.bones_of):
         own = moved[:, bones]
@@ -686,14 +694,14 @@ def _reach(
     return reached
 
 
-def _led_past(
+def _leading_past(
     plan: MotionPlan,
     arms: ArmMotion,
     reached: Reached,
     volume: BodyVolume | None,
     going: Travelled,
-) -> None:
-    """Lead arms that reach past the others, and over the ground."""
+) -> Generator[None, None, None]:
+    """Lead arms that reach past the others, and over the ground, in steps."""
     job, scale = plan.job, plan.job.creature.scale
     ground = _ground(plan) if plan.carry is None else None
     if volume is not None and job.keep_apart:
@@ -714,12 +722,13 @@ def _led_past(
             ),
         )
         arms.rotations = past if past is not None else arms.rotations
+        yield
     if ground is not None and job.reaching is not None:
         course = ArmsOverGround(job.reaching.frames, ground, scale, cyclic=job.in_place)
         poses = Poses(arms.rotations, arms.strains, *going)
         radii = [scale * each for each in job.reaching.radii]
         loose = reached.away * (1.0 - np.stack([each.max(axis=1) for each in reached.held], axis=1))
-        arms.rotations = keep_off_ground(course, poses, radii, loose)
+        arms.rotations = yield from keeping_off_ground(course, poses, radii, loose)
 
 
 def _separate(
@@ -757,16 +766,17 @@ def _separate(
     return []
 
 
-def _take_time(
+def _taking_time(
     plan: MotionPlan,
     arms: ArmMotion,
     reached: Reached | None,
     going: Travelled,
     *,
     cyclic: bool,
-) -> Floats | None:
+) -> Generator[None, None, Floats | None]:
     """Let bones that would turn too fast for an eye take their time, off the ground; but where
     nothing is to be evened out, and arms are to be at every corner of the gait's table in time.
+    In steps.
 
     Radians (moments − stride, bones) by which they turn within a frame, if none did.
     """
@@ -784,7 +794,7 @@ def _take_time(
         frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
         return turns_in_world(frames, arms.rotations, going[1], every)
     before = arms.rotations
-    turning = _give_time(plan, arms, going, held, limits, cyclic=cyclic)
+    turning = yield from _giving_time(plan, arms, going, held, limits, cyclic=cyclic)
     if reached is not None and arms.rotations is not before:
         _hold_on(plan, arms, before, reached)
     return turning
@@ -803,7 +813,7 @@ def _hold_on(plan: MotionPlan, arms: ArmMotion, before: Floats, reached: Reached
         arms.rotations[some, bones] = slerp(own, eased, share[some, None])
 
 
-def _give_time(
+def _giving_time(
     plan: MotionPlan,
     arms: ArmMotion,
     going: Travelled,
@@ -812,9 +822,9 @@ def _give_time(
     *,
     above: Floats | float = 1.0,
     cyclic: bool,
-) -> Floats | None:
+) -> Generator[None, None, Floats | None]:
     """Let bones take their time that turn by more than the limits, but of arms while they are held
-    (moments,), and off the ground, as far (moments, arms) as they are to be above it.
+    (moments,), and off the ground, as far (moments, arms) as they are to be above it. In steps.
 
     Radians (moments − stride, bones) by which they turn within a frame, if none did.
     """
@@ -822,8 +832,9 @@ def _give_time(
     frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
     before = arms.rotations
     turning = turns_in_world(frames, before, going[1], every)
+    yield
     for number in range(_EASINGS):
-        eased = eased_turns(
+        eased = yield from easing_turns(
             *(frames, arms.rotations, going[1], held),
             rate=job.timing.rate,
             limits=limits,
@@ -843,11 +854,12 @@ def _give_time(
             radii = [creature.scale * each for each in _radii(plan)]
             closer = MARGIN if last else 0.0
             share = above * changed
-            arms.rotations = keep_off_ground(course, poses, radii, share, closer=closer)
+            keeping_off = keeping_off_ground(course, poses, radii, share, closer=closer)
+            arms.rotations = yield from keeping_off
     if arms.rotations is before:
         return turning
     # Where it is no help, it is no good either.
-    arms.rotations = where_it_helps(
+    arms.rotations = yield from keeping_where_it_helps(
         *(frames, before, arms.rotations, going[1]), limits=limits, every=every, cyclic=cyclic
     )
     return None
@@ -873,7 +885,8 @@ def _trail(plan: MotionPlan, trailing: Trailing, posed: _Posed) -> Steps[None]:
         course = ArmsOverGround(frames, ground, creature.scale, cyclic=cyclic)
         poses = Poses(arms.rotations, arms.strains, *posed.going)
         radii = [creature.scale * each for each in _radii(plan)]
-        arms.rotations = keep_off_ground(course, poses, radii, free)
+        keeping_off = keeping_off_ground(course, poses, radii, free)
+        arms.rotations = yield from evenly(keeping_off, 1.0)
 
 
 def _opened(plan: MotionPlan, count: int, swimming: Floats | None) -> Opened | None:

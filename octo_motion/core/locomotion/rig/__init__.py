@@ -46,17 +46,17 @@ from .poses import (
     ArmMotion,
     Poses,
     carried_by_root_bone,
-    eased_turns,
+    easing_turns,
     fastest_turn,
     find_mantle,
     halfway_automatic,
     halfway_linear,
+    keeping_where_it_helps,
     lies_back,
     object_transforms,
     root_bone_transforms,
     stretch_mantle,
     turn_limits,
-    where_it_helps,
 )
 
 __all__ = [
@@ -83,7 +83,7 @@ __all__ = [
     "carried_by_root_bone",
     "chain_of",
     "detect_arms",
-    "eased_turns",
+    "easing_turns",
     "fastest_turn",
     "find_mantle",
     "frame_of",
@@ -92,6 +92,7 @@ __all__ = [
     "halfway_linear",
     "is_driven",
     "joint_positions",
+    "keeping_where_it_helps",
     "lies_back",
     "lift_to_floor",
     "loose_from_root",
@@ -109,5 +110,4 @@ __all__ = [
     "transport_frames",
     "turn_limits",
     "turns_in_world",
-    "where_it_helps",
 ]

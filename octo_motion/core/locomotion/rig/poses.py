@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -366,7 +366,7 @@ def turn_limits(
     return np.where(reaching[every:] | reaching[:-every], fastest_turn(rate, np.inf), most)
 
 
-def eased_turns(
+def easing_turns(
     arms: Sequence[ArmFrames],
     rotations: Floats,
     orientations: Floats,
@@ -377,8 +377,8 @@ def eased_turns(
     every: int = 1,
     cyclic: bool = False,
     turning: Floats | None = None,
-) -> tuple[Floats, Floats] | None:
-    """Arms whose bones turn no faster than an eye can follow, wherever they are free to.
+) -> Generator[None, None, tuple[Floats, Floats] | None]:
+    """Arms whose bones turn no faster than an eye can follow, wherever they are free to; in steps.
 
     Args:
         arms: in the order of their bones.
@@ -398,6 +398,7 @@ def eased_turns(
     result, moved, start = rotations, np.zeros((len(rotations), len(arms))), 0
     if turning is None:
         turning = turns_in_world(arms, rotations, orientations, every)
+        yield
     limits = np.broadcast_to(limits, (len(turning), len(arms)))
     for number, arm in enumerate(arms):
         own = slice(start, start + len(arm.bones))
@@ -419,6 +420,7 @@ def eased_turns(
         turned = multiply(conjugate(orientations[some, None]), frames[some])
         result[some, own] = arm.to_bones(turned)
         moved[:, number] = share
+        yield
     return None if result is rotations else (result, moved)
 
 
@@ -488,7 +490,7 @@ class _TakingTime:
         return normalized(frames + share[:, None, None] * (mean - frames))
 
 
-def where_it_helps(
+def keeping_where_it_helps(
     arms: Sequence[ArmFrames],
     before: Floats,
     eased: Floats,
@@ -497,16 +499,19 @@ def where_it_helps(
     limits: Floats,
     every: int = 1,
     cyclic: bool = False,
-) -> Floats:
+) -> Generator[None, None, Floats]:
     """Rotations (moments, bones, 4), eased from what they were before; as before wherever an arm
-    did not turn by more than it may, and where it still does by nearly as much more.
+    did not turn by more than it may, and where it still does by nearly as much more. In steps.
 
-    Arguments are as of :func:`eased_turns`.
+    Arguments are as of :func:`easing_turns`.
 
     Each stretch of an arm counts by itself: what cannot be helped at one place of a long way
     spoils nothing at another, and what is too fast in a hold changes nothing before and after it.
     """
-    then, now = (turns_in_world(arms, each, orientations, every) for each in (before, eased))
+    then = turns_in_world(arms, before, orientations, every)
+    yield
+    now = turns_in_world(arms, eased, orientations, every)
+    yield
     result, start = eased.copy(), 0
     limits = np.broadcast_to(limits, (len(then), len(arms)))
     for number, arm in enumerate(arms):

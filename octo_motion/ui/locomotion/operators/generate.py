@@ -409,7 +409,9 @@ def _read_from(armature: bpy.types.Object, settings: OCTO_MOTION_PG_locomotion) 
     hangs += [*armature.delta_rotation_quaternion]
     hangs += [value for row in armature.matrix_parent_inverse for value in row]
     modes = [armature.rotation_mode, *(each.rotation_mode for each in bones)]
-    rig: list[Any] = [[*place], hangs, rest, modes]
+    # What may stretch hangs on that.
+    passed_on = [(each.bone.inherit_scale, each.bone.use_connect) for each in bones]
+    rig: list[Any] = [[*place], hangs, rest, modes, passed_on]
     groups = asked, asked["body"], asked["ground"]
     known = [{name: each[name] for name in sorted(_OF_RIG & each.keys())} for each in groups]
     return json.dumps([asked, wishes, rig], sort_keys=True), json.dumps([known, rig])

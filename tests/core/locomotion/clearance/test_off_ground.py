@@ -7,12 +7,13 @@ import pytest
 from octo_motion.core.locomotion.clearance.corrections import (
     ArmsOverGround,
     afloat,
-    keep_off_ground,
+    keeping_off_ground,
 )
 from octo_motion.core.locomotion.ground.surface import LevelGround
 from octo_motion.core.locomotion.rig.bone_rotations import frames_of_arm
 from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import Floats, from_axis_angle
+from octo_motion.core.steps import finished
 from tests.core.grounds import GROUNDS, largest_turn, walker
 
 
@@ -42,7 +43,7 @@ def test_arms_that_would_hang_into_the_ground_stay_above_it() -> None:
     assert before[0].min() > 0.1
     assert before[-1].max() < -0.2
     loose = np.ones((49, len(course.arms)))
-    rotations = keep_off_ground(course, poses, radii, loose)
+    rotations = finished(keeping_off_ground(course, poses, radii, loose))
     after = Poses(rotations, poses.strains, poses.locations, poses.orientations)
     assert course.clear(course.joints(after)).min() > 0.0
     # High above nothing happens, and nothing happens at once.
@@ -54,7 +55,7 @@ def test_arms_that_are_not_loose_stay_as_they_are() -> None:
     course, poses, radii = hanging(5)
     loose = np.zeros((5, len(course.arms)))
     loose[:, 1] = 1.0
-    rotations = keep_off_ground(course, poses, radii, loose)
+    rotations = finished(keeping_off_ground(course, poses, radii, loose))
     for number, own in enumerate(course.bones):
         same = np.array_equal(rotations[:, own], poses.rotations[:, own])
         assert same == (number != 1)

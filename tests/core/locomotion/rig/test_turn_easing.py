@@ -3,12 +3,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_arm
-from octo_motion.core.locomotion.rig.poses import eased_turns, turn_limits, where_it_helps
+from octo_motion.core.locomotion.rig.poses import (
+    easing_turns,
+    keeping_where_it_helps,
+    turn_limits,
+)
 from octo_motion.core.rotations import Floats, from_axis_angle, rotate
+from octo_motion.core.steps import finished
 from tests.core.rigs import body_with_arms
 
 FRAMES = 240
@@ -17,6 +24,14 @@ FASTEST = np.radians(28.0) * 24.0
 SLOWLY = 1e6
 """Frames of a cycle."""
 STILL = np.tile([1.0, 0.0, 0.0, 0.0], (FRAMES, 1))
+
+
+def eased_turns(*args: Any, **kwargs: Any) -> tuple[Floats, Floats] | None:
+    return finished(easing_turns(*args, **kwargs))
+
+
+def where_it_helps(*args: Any, **kwargs: Any) -> Floats:
+    return finished(keeping_where_it_helps(*args, **kwargs))
 
 
 def arms_of() -> list[ArmFrames]:
