@@ -20,7 +20,14 @@ from .grasp_target import (
 from .imports import NOTE, ImportedClip, Up, import_clip, remove_clips
 from .loose_objects import LooseObject
 from .octopus import add_octopus, own_collection
-from .surfaces import is_enabled, read_ground_mesh, read_motion, read_obstacle, read_triangles
+from .surfaces import (
+    is_enabled,
+    may_change,
+    read_ground_mesh,
+    read_motion,
+    read_obstacle,
+    read_triangles,
+)
 
 __all__ = [
     "CARRIED",
@@ -41,6 +48,7 @@ __all__ = [
     "is_carried",
     "is_enabled",
     "markers",
+    "may_change",
     "may_move",
     "own_collection",
     "part_of_pose",

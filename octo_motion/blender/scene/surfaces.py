@@ -115,6 +115,16 @@ _LOOKS: Final = np.array([0.0, 0.29, 0.62, 1.0])
 """Shares of the frames at which it is looked whether it does."""
 
 
+def may_change(ground: bpy.types.Object) -> bool:
+    """Whether a mesh object may be another one at another frame."""
+    data = ground.data
+    assert isinstance(data, bpy.types.Mesh)
+    keys = data.shape_keys
+    animated = data.animation_data or (keys is not None and keys.animation_data)
+    deforms = any(each.type in _DEFORMS and each.show_viewport for each in ground.modifiers)
+    return bool(may_move(ground) or animated or deforms)
+
+
 def read_motion(ground: bpy.types.Object, frames: Floats) -> tuple[np.ndarray, np.ndarray] | None:
     """How a mesh object moves and deforms: its vertices (n, vertices, 3) at frames (n,), world, and
     those of its triangles (faces, 3); none where it stays as it is.
@@ -122,13 +132,6 @@ def read_motion(ground: bpy.types.Object, frames: Floats) -> tuple[np.ndarray, n
     Raises:
         GroundError: it has other vertices or faces from frame to frame.
     """
-    data = ground.data
-    assert isinstance(data, bpy.types.Mesh)
-    keys = data.shape_keys
-    animated = data.animation_data or (keys is not None and keys.animation_data)
-    deforms = any(each.type in _DEFORMS and each.show_viewport for each in ground.modifiers)
-    if not (may_move(ground) or animated or deforms):
-        return None
     scene = bpy.context.scene
     assert scene is not None
     with time_kept(scene) as go_to:

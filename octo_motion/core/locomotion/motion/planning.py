@@ -544,6 +544,9 @@ def _rolling_out(
     beyond = max(each.travel.stride for each in job.gaits) * reach + reach
     sizes = reach, beyond, always
     yield
+    # To read them takes as long as to look at them.
+    _ = mesh.triangles
+    yield
 
     def made() -> tuple[Unrolled, Floats, np.ndarray] | None:
         space = roll_out(route, mesh.triangles, reach=reach, beyond=beyond, always=always)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final, cast
 
@@ -25,6 +25,7 @@ from ....blender.scene import (
     home_of,
     is_carried,
     is_enabled,
+    may_change,
     read_form,
     read_ground_mesh,
     read_motion,
@@ -385,17 +386,22 @@ def read_ground(
 
 
 def read_moving(
-    ground: GroundJob, armature: bpy.types.Object, obj: bpy.types.Object | None, frames: Floats
+    ground: GroundJob,
+    armature: bpy.types.Object,
+    obj: bpy.types.Object | None,
+    frames_of: Callable[[], Floats],
 ) -> GroundJob:
-    """The same ground as it is at the first of some frames (n,), and how it moves over all of them.
+    """The same ground as it is at the first of some frames (n,), and how it moves over all of them:
+    what tells these takes a while, and is not asked without need.
 
     One that hangs on the creature that walks on it is taken as it is.
 
     Raises:
         GroundError: it has other vertices or faces from frame to frame.
     """
-    if ground.mesh is None or obj is None or hangs_on(obj, armature):
+    if ground.mesh is None or obj is None or hangs_on(obj, armature) or not may_change(obj):
         return ground
+    frames = frames_of()
     if (read := read_motion(obj, frames)) is None:
         return ground
     moving = MovingMesh(frames, *read)

@@ -637,8 +637,11 @@ def _with_motion_of_ground(
     """The same motion, on ground that moves meanwhile if it does."""
     if job.ground is None or job.ground.mesh is None:
         return job
-    moving = read_moving(job.ground, armature, ground, schedule(in_bends(job)).frames)
-    return replace(job, ground=moving)
+
+    def frames() -> Floats:
+        return schedule(in_bends(job)).frames
+
+    return replace(job, ground=read_moving(job.ground, armature, ground, frames))
 
 
 def _write_back(*objects: bpy.types.Object | None) -> None:
