@@ -173,6 +173,9 @@ _known: WeakKeyDictionary[type, list[tuple[str, str, bool]]] = WeakKeyDictionary
 """The properties of each kind of group, as long as it is registered."""
 
 
+_SIMPLE: Final = frozenset({"BOOLEAN", "INT", "FLOAT", "STRING"})
+
+
 def plain(group: Any, *, without: frozenset[str] = frozenset()) -> dict[str, Any]:
     """All properties of a group by name: groups become dictionaries, data-blocks their names.
 
@@ -183,7 +186,9 @@ def plain(group: Any, *, without: frozenset[str] = frozenset()) -> dict[str, Any
         if name in without:
             continue
         value = getattr(group, name)
-        if kind == "COLLECTION":
+        if kind in _SIMPLE and not is_array:
+            result[name] = value
+        elif kind == "COLLECTION":
             result[name] = [plain(each, without=without) for each in value]
         elif isinstance(value, bpy.types.ID):
             result[name] = value.name

@@ -25,6 +25,8 @@ from .surface import Ground, Limbs
 _ROUNDS: Final = 4
 """How often it is looked at how far level a segment leads, where the ground rises or falls. With
 two bones are off by 0.5°, with eight by no more than 0.005°."""
+_ROUGH_ROUNDS: Final = 2
+"""The same of what is to be soon known, and may be off."""
 _APART: Final = 0.02
 """Share of its length by which a segment may still be too long or too short then …"""
 _STEP_HALVINGS: Final = 14
@@ -42,6 +44,7 @@ def laid(
     spot: Floats,
     heading: Floats,
     curl: Floats,
+    rough: bool = False,
 ) -> Floats:
     """Joints from one on (arms, cycles, joints, 3) on the ground, segments as long as they are.
 
@@ -53,6 +56,7 @@ def laid(
         spot: (arms, cycles, 3) where; its height is not looked at.
         heading: (arms, cycles) which way they lie, radians about world Z from +X.
         curl: (arms, cycles) radians by which they are bent to one side on the way to the tip.
+        rough: whether they may be a little off.
     """
     lengths = limbs.lengths[joint:]
     span = np.maximum(lengths.sum(axis=0), 1e-12)
@@ -68,7 +72,7 @@ def laid(
         bones = lengths[number : number + 2].max(axis=0)[:, None]
         way = _Way(ground, place, onward, skins[..., number + 1], bones)
         whole = np.broadcast_to(length[:, None], heading.shape)
-        step, rise = _along(way, whole)
+        step, rise = _along(way, whole, _ROUGH_ROUNDS if rough else _ROUNDS)
         place = place + np.concatenate([step[..., None] * onward, rise[..., None]], axis=-1)
         joints.append(place)
         passed = passed + length
@@ -101,10 +105,10 @@ class _Way:
         return _Way(self.ground, self.place[chosen], self.onward[chosen], self.skin[chosen], bones)
 
 
-def _along(way: _Way, length: Floats) -> tuple[Floats, Floats]:
+def _along(way: _Way, length: Floats, rounds: int) -> tuple[Floats, Floats]:
     """How far a segment (…,) leads level, and how much up, both (…,) metres."""
     step, rise = length, np.zeros(length.shape)
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         rise = way.rise(step)
         step = step * length / np.sqrt(step * step + rise * rise)
     factor = length / np.sqrt(step * step + rise * rise)

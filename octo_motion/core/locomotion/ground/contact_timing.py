@@ -149,9 +149,10 @@ def finding_line(
     count = int(np.ceil((end - start + 2.0 * margin) / spacing)) + 1
     distance = start - margin + spacing * np.arange(count)
     walked: list[tuple[Floats, Floats]] = []
-    for part in np.array_split(distance, _PARTS):
+    parts = _PARTS if around is None else 1
+    for part in np.array_split(distance, parts):
         walked.append(walked_at(route, settings, bearings, part, coarse=around is not None))
-        yield 0.6 + 0.2 * len(walked) / _PARTS
+        yield 0.6 + 0.2 * len(walked) / parts
     positions, turns = (np.concatenate(each) for each in zip(*walked, strict=True))
     along, left = _ways(positions)
     felt = ground.height(positions[:, None, :2] + reach * _ACROSS[:, None] * left[:, None])

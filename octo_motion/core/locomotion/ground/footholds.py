@@ -415,6 +415,7 @@ def laying(
     seed: int = 0,
     cyclic: bool = False,
     uneven: UnevenHolds | None = None,
+    rough: bool = False,
 ) -> Generator[None, None, Footholds]:
     """Lay all footholds of some arms, in steps.
 
@@ -430,6 +431,7 @@ def laying(
         seed: of the small differences from step to step.
         cyclic: whether there are none, so that each cycle is like the one before …
         uneven: … but for what holds differ by in place.
+        rough: whether they are soon found, and may be a little off.
     """
     numbers = np.arange(cycles[0], cycles[1] + 1)
     shape = len(limbs.arms), len(numbers)
@@ -442,7 +444,8 @@ def laying(
     spot, heading = overridden.put(spot, np.arctan2(lie[..., 1], lie[..., 0]))
     # As if they were round.
     skins = np.broadcast_to(limbs.radii[joint:].T[:, None], (*shape, len(limbs.radii) - joint))
-    joints = laid(limbs, ground, joint, skins=skins, spot=spot, heading=heading, curl=curl)
+    placed = {"skins": skins, "spot": spot, "heading": heading, "curl": curl}
+    joints = laid(limbs, ground, joint, **placed, rough=rough)
     yield
     touch_down, lift_off, middles = _times(shift, half)
     at_touch_down, at_lift_off = roots.at(np.stack([touch_down, lift_off]))[0]

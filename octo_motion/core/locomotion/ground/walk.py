@@ -474,6 +474,7 @@ class GroundedWalk:
                     seed=seed,
                     cyclic=self._cyclic,
                     uneven=self._uneven,
+                    rough=poser.rough,
                 )
                 parts.append(WalkPart(poser, ground, settings, sides, own, limbs, footholds))
         self._found = parts

@@ -319,6 +319,7 @@ def in_bends(job: MotionJob) -> MotionJob:
     return replace(job, route=planned.route.of_curve(job.route.bare))
 
 
+@lru_cache(maxsize=2)
 def slowed_route(job: MotionJob) -> Route | None:
     """The route of a motion in its plan, on which it is slower in tight bends."""
     walks = [each.travel for each in job.gaits if each.settings.gait.on_ground]

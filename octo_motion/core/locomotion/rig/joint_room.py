@@ -12,6 +12,7 @@ Heights are over the ground under the joint, along world Z.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -142,7 +143,7 @@ class ArmSkin:
         at_joints = np.concatenate([np.maximum(facing[:-1, 1], facing[1:, 0]), facing[-1:, 1]])
         return bool(np.all(at_joints[first - 1 :] >= _ROUND))
 
-    @property
+    @cached_property
     def _parts(self) -> Floats:
         """``reaches``, of the skin's radius there."""
         ends = np.stack([self.radii[:-1], self.radii[1:]], axis=-1)
