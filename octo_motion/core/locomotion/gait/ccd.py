@@ -193,6 +193,8 @@ _SLIGHT: Final = np.radians(8.0)
 _MOST_FOLDED: Final = np.tan(np.radians(85.0)) ** 2
 _NEWTON_STEPS: Final = 6
 _NEWTON_STEPS_BETWEEN: Final = 2
+_ROUGH_NEWTON_STEPS: Final = 3, 1
+"""Both of what is to be soon known, and may be off."""
 # A step that changes less than this, as a share, is the last: the next one would be its square.
 _NEAR: Final = 1e-7
 # Arm lengths within which a joint comes to rest on a floor.
@@ -273,13 +275,14 @@ def solving_ccd(
         rough: whether fewer sweeps do, and the shape may differ a little.
     """
     directions, sweeps = np.empty_like(shape), ROUGH_SWEEPS if rough else SWEEPS
+    exact, between = _ROUGH_NEWTON_STEPS if rough else (_NEWTON_STEPS, _NEWTON_STEPS_BETWEEN)
     root = np.zeros_like(targets[0])
     for group, segments in enumerate(chain.groups):
         lengths, goal = chain.lengths[segments], targets[group + 1] - root
         own = aimed(components_first.rotate(links[group], shape[segments]), lengths, goal)
         for _ in range(sweeps if len(own) > 1 else 0):
             own = swept(own, lengths, chain.weights[segments], goal)
-        directions[segments] = close_group(own, lengths, goal, stretch_slack=stretch_slack)
+        directions[segments] = close_group(own, lengths, goal, exact, stretch_slack=stretch_slack)
         root = root + chord(directions[segments], lengths)
         yield directions
     iterations = SOFTENINGS if softness > 0.0 or floor is not None else 0
@@ -293,7 +296,7 @@ def solving_ccd(
         if floor is not None:
             directions = lifted(directions, chain.lengths, floor)
         # Only the last closing has to be exact.
-        steps = _NEWTON_STEPS if number == iterations else _NEWTON_STEPS_BETWEEN
+        steps = exact if number == iterations else between
         root = np.zeros_like(root)
         for group, segments in enumerate(chain.groups):
             lengths, goal = chain.lengths[segments], targets[group + 1] - root

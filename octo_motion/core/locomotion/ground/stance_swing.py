@@ -37,6 +37,8 @@ from .surface import Ground, Limbs, StanceSettings
 _STEPS: Final = (4, 3, 3, 4)
 """Newton's steps each time that an arm is drawn to its foothold, after it was raised. With half as
 many arms miss it by 0.00001."""
+_ROUGH_STEPS: Final = (2, 1, 1, 2)
+"""The same of what is to be soon known, and may be off."""
 _EVENED: Final = 0.3
 """Share of the mean of its neighbours that a segment takes on each time before it is raised.
 Without it arms overlap by 0.077 radii, with a jerk of 0.097."""
@@ -256,14 +258,22 @@ def stance_at(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Flo
 
 
 def pulling_to_footholds(
-    batch: Batch, shapes: Floats, stance: Stance, ground: Ground, settings: StanceSettings
+    batch: Batch,
+    shapes: Floats,
+    stance: Stance,
+    ground: Ground,
+    settings: StanceSettings,
+    *,
+    rough: bool = False,
 ) -> Generator[None, None, tuple[Floats, Floats]]:
     """Strains (segments, batch) and directions (segments, 3, batch) of arms, in steps.
 
-    Arms with their gait's shapes (segments, 3, batch), world, brought to their footholds; in the
-    air they may be in the ground.
+    Arms with their gait's shapes (segments, 3, batch), world, brought to their footholds, or
+    roughly so; in the air they may be in the ground.
     """
-    strains, standing = yield from _in_stance(batch, shapes, stance, ground, settings)
+    steps = _ROUGH_STEPS if rough else _STEPS
+    posing = _in_stance(batch, shapes, stance, ground, settings, steps=steps)
+    strains, standing = yield from posing
     return strains, lerp_bends(batch.outward, standing, shapes, 1.0 - stance.weight)
 
 
@@ -335,9 +345,16 @@ def _crested(stance: Stance, ground: Ground) -> Floats:
 
 
 def _in_stance(
-    batch: Batch, shapes: Floats, stance: Stance, ground: Ground, settings: StanceSettings
+    batch: Batch,
+    shapes: Floats,
+    stance: Stance,
+    ground: Ground,
+    settings: StanceSettings,
+    *,
+    steps: tuple[int, ...],
 ) -> Generator[None, None, tuple[Floats, Floats]]:
-    """Strains (segments, batch) and directions (segments, 3, batch) of arms that hold on.
+    """Strains (segments, batch) and directions (segments, 3, batch) of arms that hold on, drawn to
+    their footholds in rounds of so many of Newton's steps.
 
     Arms that do not, for the moment, are posed as they held on last, or will next; of those that
     never do it is the gait's shape.
@@ -355,14 +372,22 @@ def _in_stance(
     own = components_first.normalized(
         guess + (kept * _freedom(batch, stance))[:, None] * (shapes - guess)
     )
-    own = yield from _drawn_to_foothold(batch, own, stance, ground, strain=strain, chord=chord)
+    bent_by = {"strain": strain, "chord": chord}
+    own = yield from _drawn_to_foothold(batch, own, stance, ground, **bent_by, rounds=steps)
     own = _laid_on_ground(batch, own, strain, stance, ground)
     strains[:, chosen], directions[..., chosen] = strain * stance.weight, own
     return strains, directions
 
 
 def _drawn_to_foothold(
-    batch: Batch, own: Floats, stance: Stance, ground: Ground, *, strain: Floats, chord: Floats
+    batch: Batch,
+    own: Floats,
+    stance: Stance,
+    ground: Ground,
+    *,
+    strain: Floats,
+    chord: Floats,
+    rounds: tuple[int, ...],
 ) -> Generator[None, None, Floats]:
     """Directions (segments, 3, batch) of arms in stance, from their own, that meet their footholds.
 
@@ -381,9 +406,9 @@ def _drawn_to_foothold(
     soft = _SOFT * np.max(batch.radii, axis=0) + _TINY
     room = JointRoom(needed, _loose(batch, stance), soft)
     before = shares_before(batch.limbs.weights[:, 0])[:, None]
-    for number, steps in enumerate(_STEPS):
+    for number, steps in enumerate(rounds):
         # The last time it only has to meet its goal.
-        softer = evened(own, _EVENED * free, before) if number < len(_STEPS) - 1 else own
+        softer = evened(own, _EVENED * free, before) if number < len(rounds) - 1 else own
         own = raise_over_ground(
             softer,
             lengths,

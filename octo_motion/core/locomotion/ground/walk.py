@@ -230,7 +230,9 @@ class WalkPart:
         shapes = components_first.rotate(facing, shapes[..., chosen].reshape(bones, 3, -1))
         times = (each[:, columns].reshape(-1) for each in (moments.cycles, moments.since))
         stance = stance_at(arms, self.footholds, *times)
-        pulling = pulling_to_footholds(arms, shapes, stance, self.ground, self.settings)
+        pulling = pulling_to_footholds(
+            *(arms, shapes, stance, self.ground, self.settings), rough=self.poser.rough
+        )
         strains, ways = yield from pulling
         yield
         evened, each_frame = None, (bones, 3, frames, many)

@@ -625,11 +625,16 @@ def _poser(job: MotionJob, gait: GaitJob, lean: float) -> GaitPoser:
 
 def _rough_poser(job: MotionJob, lean: float, *, anew: bool) -> GaitPoser:
     """What moves the arms roughly in a motion's gait: the same as before, or soon made anew."""
-    moved = _moved_by(job, job.gaits[0], lean)
-    key = content_key(*moved)
+    moved, key = _moved_by(job, job.gaits[0], lean), _key_of_gait(job, lean)
     if (known := _posers.known(key)) is not None and not anew:
         return roughly(known)
     return _posers.get(key + b"rough", lambda: RoughGaitPoser(*moved))
+
+
+@lru_cache(maxsize=4)
+def _key_of_gait(job: MotionJob, lean: float) -> bytes:
+    """A key of what moves the arms in the gait that a motion begins with."""
+    return content_key(*_moved_by(job, job.gaits[0], lean))
 
 
 def _moved_by(
