@@ -168,9 +168,6 @@ def pseudo_targets(rotations: Floats, widths: Floats) -> Floats:
 SWEEPS: Final = 4
 """Sweeps of CCD over a group. Two or eight change slip, overlap and turns of the ten set-ups on
 bumps by less than a tenth."""
-ROUGH_SWEEPS: Final = 1
-ROUGH_SOFTENINGS: Final = 2
-"""The same of what is to be soon known, and may be off."""
 SOFTENINGS: Final = 4
 """How often bends are spread and the groups closed again. With two Swim has a jerk (as in
 ``ground/stance_swing``) of 0.085 instead of 0.073, with eight it turns by 0.28 radians from frame
@@ -193,8 +190,10 @@ _SLIGHT: Final = np.radians(8.0)
 _MOST_FOLDED: Final = np.tan(np.radians(85.0)) ** 2
 _NEWTON_STEPS: Final = 6
 _NEWTON_STEPS_BETWEEN: Final = 2
+_ROUGH_SOFTENINGS: Final = 2
 _ROUGH_NEWTON_STEPS: Final = 3, 1
-"""Both of what is to be soon known, and may be off."""
+"""All three of what is to be soon known, and may be off. With a sweep of CCD besides, it is off by
+no less."""
 # A step that changes less than this, as a share, is the last: the next one would be its square.
 _NEAR: Final = 1e-7
 # Arm lengths within which a joint comes to rest on a floor.
@@ -272,9 +271,9 @@ def solving_ccd(
         stretch_slack: group lengths by which a group may reach beyond its target as it straightens.
         floor: (batch,) height that joints between the groups' ends keep above, as far as the
             targets let them.
-        rough: whether fewer sweeps do, and the shape may differ a little.
+        rough: whether it may do without sweeps, and the shape may differ a little.
     """
-    directions, sweeps = np.empty_like(shape), ROUGH_SWEEPS if rough else SWEEPS
+    directions, sweeps = np.empty_like(shape), 0 if rough else SWEEPS
     exact, between = _ROUGH_NEWTON_STEPS if rough else (_NEWTON_STEPS, _NEWTON_STEPS_BETWEEN)
     root = np.zeros_like(targets[0])
     for group, segments in enumerate(chain.groups):
@@ -286,7 +285,7 @@ def solving_ccd(
         root = root + chord(directions[segments], lengths)
         yield directions
     iterations = SOFTENINGS if softness > 0.0 or floor is not None else 0
-    iterations = min(iterations, ROUGH_SOFTENINGS) if rough else iterations
+    iterations = min(iterations, _ROUGH_SOFTENINGS) if rough else iterations
     for number in range(1, iterations + 1):
         before = directions
         for _ in range(_SPREADS):
