@@ -25,7 +25,9 @@ from ...steps import finished
 _EDGE: Final = 1e-6
 """Share of a face by which it reaches beyond its edges, so that none falls between two."""
 _AT_ONCE: Final = 2_000_000
-"""Pairs of faces and samples that are looked at together."""
+"""Pairs of faces and samples that are looked at together, …"""
+_FACES_AT_ONCE: Final = 32_768
+"""… and faces: what comes in steps is not to take long."""
 _SIDE: Final = 16
 """Samples along a side of a face that is small."""
 _BLOCK: Final = 16
@@ -522,6 +524,16 @@ def _hits(triangles: Floats, grid: HeightField) -> Iterator[tuple[np.ndarray, Fl
     """Numbers of samples, heights there and numbers of faces that lie over or under them, in
     blocks.
     """
+    for start in range(0, len(triangles), _FACES_AT_ONCE):
+        some = triangles[start : start + _FACES_AT_ONCE]
+        for samples, heights, numbers in _hits_of(some, grid):
+            yield samples, heights, start + numbers
+
+
+def _hits_of(
+    triangles: Floats, grid: HeightField
+) -> Iterator[tuple[np.ndarray, Floats, np.ndarray]]:
+    """The same of some faces."""
     faces, width = _over(triangles, grid), grid.heights.shape[1]
     longest = np.maximum(faces.columns, faces.rows)
     size, done = 1, 0
