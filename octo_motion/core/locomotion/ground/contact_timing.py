@@ -148,8 +148,7 @@ def finding_line(
     start, end = around or (0.0, route.length)
     count = int(np.ceil((end - start + 2.0 * margin) / spacing)) + 1
     distance = start - margin + spacing * np.arange(count)
-    walked: list[tuple[Floats, Floats]] = []
-    parts = _PARTS if around is None else 1
+    walked, parts = list[tuple[Floats, Floats]](), _PARTS if around is None else 1
     for part in np.array_split(distance, parts):
         walked.append(walked_at(route, settings, bearings, part, coarse=around is not None))
         yield 0.6 + 0.2 * len(walked) / parts

@@ -434,21 +434,18 @@ def laying(
         rough: whether they are soon found, and may be a little off.
     """
     numbers = np.arange(cycles[0], cycles[1] + 1)
-    shape = len(limbs.arms), len(numbers)
-    overridden = _overridden(limbs, shape, cycles[0], contact_overrides)
+    overridden = _overridden(limbs, (len(limbs.arms), len(numbers)), cycles[0], contact_overrides)
     late, *beside, bent = _differing(uneven, limbs, numbers)
     shift, joint = overridden.shift + late, limbs.touching(settings.planted)
     roots = _RootPath(limbs, line, timing, numbers, middle / CYCLE)
     curl = _curls(limbs, 0 * numbers if cyclic else numbers, seed) + bent
     spot, lie, half, firm = yield from _finding_places(roots, shift, ground, settings, beside)
     spot, heading = overridden.put(spot, np.arctan2(lie[..., 1], lie[..., 0]))
-    # As if they were round.
-    skins = np.broadcast_to(limbs.radii[joint:].T[:, None], (*shape, len(limbs.radii) - joint))
+    skins = _as_if_round(limbs, joint, len(numbers))
     placed = {"skins": skins, "spot": spot, "heading": heading, "curl": curl}
     joints = laid(limbs, ground, joint, **placed, rough=rough)
     yield
-    touch_down, lift_off, middles = _times(shift, half)
-    at_touch_down, at_lift_off = roots.at(np.stack([touch_down, lift_off]))[0]
+    touch_down, lift_off, middles, (at_touch_down, at_lift_off) = _times(roots, shift, half)
     return Footholds(
         first=cycles[0],
         touching=joint,
@@ -467,8 +464,15 @@ def laying(
     )
 
 
-def _times(shift: Floats, half: Floats) -> tuple[Floats, Floats, Floats]:
-    """When stances begin and end, and half way between unrolled and peeling, (arms, cycles) each.
+def _as_if_round(limbs: Limbs, joint: int, cycles: int) -> Floats:
+    """Metres (arms, cycles, segments + 1 − c) from joints c … n of round arms to the skin below."""
+    skins = limbs.radii[joint:].T
+    return np.broadcast_to(skins[:, None], (len(skins), cycles, skins.shape[1]))
+
+
+def _times(roots: _RootPath, shift: Floats, half: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """When stances begin and end, and half way between unrolled and peeling, (arms, cycles) each;
+    and where roots are as they begin and end (2, arms, cycles, 3), world.
 
     Stances that are shifted are told from the middle that the gait gives them.
     """
@@ -476,7 +480,8 @@ def _times(shift: Floats, half: Floats) -> tuple[Floats, Floats, Floats]:
     lift_off = np.minimum(shift + half, _EARLIEST)
     unrolled = touch_down + UNROLLING * (lift_off - touch_down)
     peeling = lift_off - PEELING * (lift_off - touch_down)
-    return touch_down, lift_off, 0.5 * (unrolled + peeling)
+    at_ends = roots.at(np.stack([touch_down, lift_off]))[0]
+    return touch_down, lift_off, 0.5 * (unrolled + peeling), at_ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -639,9 +644,9 @@ def relaid(footholds: Footholds, limbs: Limbs, ground: Ground, skins: Floats) ->
     Skins (arms, cycles, segments + 1 − c) are metres from each joint to the skin below it.
     """
     joint, spot = footholds.touching, footholds.joints[:, :, 0]
-    turns = {"heading": footholds.headings, "curl": footholds.curls}
+    heading, curl = footholds.headings, footholds.curls
     lasts = footholds.lift_off - footholds.touch_down
-    joints = laid(limbs, ground, joint, skins=skins, spot=spot, **turns)
+    joints = laid(limbs, ground, joint, skins=skins, spot=spot, heading=heading, curl=curl)
     return replace(
         footholds,
         joints=joints,

@@ -17,7 +17,6 @@ from ...keyframes import Channel
 from ...phrases import phrase
 from ...rotations import IDENTITY, Floats, conjugate, from_matrix, multiply, rotate, slerp
 from ...smoothing import covered, smooth_step
-from ...steps import evenly
 from ..body import BodyMoments, OrganPoses, carriages, pose_organs
 from ..clearance import (
     ArmsOverGround,
@@ -212,7 +211,7 @@ def pose(plan: MotionPlan, *, brief: bool = False) -> Steps[MotionResult]:
     if trailing is not None:
         yield from scaled(_trail(plan, trailing, posed), _TRAILING * moving, moving)
     if posed.hands:
-        yield from evenly(_handing_over(plan, posed), moving)
+        yield from scaled(_handing_over(plan, posed), moving, moving)
     yield moving
     arms, keyed, reached = posed.arms, posed.keyed, posed.reached
     organs = organs_at(plan, moments, keyed, posed.swimming)
@@ -353,13 +352,13 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     # What is reached for is in the world.
     reached = None
     if plan.carry is None:
-        reached = yield from evenly(_reaching(plan, arms, volume, keyed, going), 0.94)
+        reached = yield from scaled(_reaching(plan, arms, volume, keyed, going), 0.94, 0.94)
     yield 0.96
     making_way = _separate(plan, arms, reached, going, volume, swimming=swimming, cyclic=cyclic)
     warnings = yield from scaled(making_way, 0.96, 0.98)
     yield 0.98
     taking_time = _taking_time(plan, arms, reached, going, cyclic=cyclic)
-    turning = yield from evenly(taking_time, 0.98)
+    turning = yield from scaled(taking_time, 0.98, 0.98)
     if hands or job.in_place or job.body.trailing is not None or plan.carry is not None:
         # What plays is another motion yet.
         turning = None
@@ -367,7 +366,7 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     if plan.carry is not None:
         planned, arms = (arms, going), arms.copy()
         going = keyed = _carried(plan, plan.carry, arms, going, (travel.distance, times))
-        reached = yield from evenly(_reaching(plan, arms, volume, keyed, going), 0.99)
+        reached = yield from scaled(_reaching(plan, arms, volume, keyed, going), 0.99, 0.99)
         eased = _body_of(creature, going)
         eased = eased_places(hands, creature.body, creature.scale, eased)
     else:
@@ -476,7 +475,7 @@ def glimpse(plan: MotionPlan, frame: float) -> Steps[Glimpse]:
     first, last = max(middle - around, 0), middle + around + 1
     posed = yield from _posed(plan, times[first:last], 2 * around + 1, cyclic=False)
     if posed.hands:
-        yield from evenly(_handing_over(plan, posed), 1.0)
+        yield from scaled(_handing_over(plan, posed), 1.0, 1.0)
     yield 1.0
     organs = organs_at(plan, moments[first:last], posed.keyed, posed.swimming)
     yield 1.0
@@ -886,7 +885,7 @@ def _trail(plan: MotionPlan, trailing: Trailing, posed: _Posed) -> Steps[None]:
         poses = Poses(arms.rotations, arms.strains, *posed.going)
         radii = [creature.scale * each for each in _radii(plan)]
         keeping_off = keeping_off_ground(course, poses, radii, free)
-        arms.rotations = yield from evenly(keeping_off, 1.0)
+        arms.rotations = yield from scaled(keeping_off, 1.0, 1.0)
 
 
 def _opened(plan: MotionPlan, count: int, swimming: Floats | None) -> Opened | None:
