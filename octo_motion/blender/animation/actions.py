@@ -664,8 +664,9 @@ class HalfWritten:
     """A generated action that gets its keys a few curves at a time, while Blender goes on.
 
     Of curves that keep their number of keys nothing is seen before all are written, for Blender
-    looks at keys anew only once it is told of them. Until then the action counts as one that nobody
-    has edited, also after a step back.
+    looks at keys anew only once it is told of them; of others each one is, and whoever lets these
+    be written sees to it that what is in sight is shown again. Until then the action counts as one
+    that nobody has edited, also after a step back.
 
     Args:
         action: one that may be replaced.
@@ -675,6 +676,8 @@ class HalfWritten:
         self.name = action.name
         self.curves: dict[tuple[str, int], _Filled] = {}
         """Those that are filled, by data path and index."""
+        self.is_seen = False
+        """Whether Blender has looked at some that are not nearly what they were."""
         self._written: _Written | None = None
         """All of them, once the action is what it will be."""
         self._channels: Sequence[Channel] = ()
@@ -700,13 +703,15 @@ class HalfWritten:
         channels: Sequence[Channel],
         *,
         automatic: bool,
+        nearly: bool,
         seen: bool,
         repeats: bool,
     ) -> Iterator[None]:
         """Fill the curves that are there, in steps. What would be seen of it waits, unless the
-        motion is nearly the same: then that may be.
+        motion is nearly the same, or it may be seen.
         """
         self.curves.clear()
+        self.is_seen = False
         self._written, self._channels = None, list(channels)
         times = _checked(frames, channels)
         points, kinds = _dense_keys(times, automatic=automatic)
@@ -726,8 +731,10 @@ class HalfWritten:
                     count = len(times) if channel.keys is None else len(channel.keys)
                     if (curve := curves.get(place)) is None:
                         continue
-                    if not seen and len(curve.keyframe_points) != count:
+                    other = len(curve.keyframe_points) != count and not nearly
+                    if other and not seen:
                         continue
+                    self.is_seen |= other
                     if place not in self._before and place not in self._new:
                         self._before[place] = _read_keys(curve)
                     own = place in self._before and _are_own_handles(self._before[place])

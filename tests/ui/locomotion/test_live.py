@@ -838,6 +838,55 @@ def test_few_keys_come_a_few_curves_at_a_time_too(slowly: Any) -> None:
     assert motion(slowly) == followed
 
 
+@pytest.fixture
+def few(slowly: Any) -> Any:
+    """The same with few keys, as what is dragged next is to have."""
+    settings_of(slowly).keys = "REDUCED"
+    generate(slowly)
+    settle()
+    counts = {len(values) for values in motion(slowly).values()}
+    assert min(counts) < 400
+    return slowly
+
+
+def test_few_keys_become_many_a_few_curves_at_a_time_and_the_frame_in_sight_stays_as_it_is_shown(
+    few: Any,
+) -> None:
+    drag_route(few)
+    bpy.context.view_layer.update()
+    live.run_pending()
+    as_planned(few)
+    name, work = as_written(few)
+    shown, most, turns = seen(few), 4 * actions.CHANNELS_AT_ONCE, 0
+    while live._state.following.get(name) is work:
+        last = motion(few)
+        live._state.go_on(name, 0.0)
+        now = motion(few)
+        changed = sum(now[place] != last[place] for place in now)
+        assert changed <= most
+        turns += changed > 0
+        bpy.context.view_layer.update()
+        assert apart(seen(few), shown) < 1e-6
+    assert turns > len(now) / most
+    assert {len(values) for values in now.values()} == {400}
+    live.finish_following()
+    followed = motion(few)
+    assert not actions.is_edited(action_of(few))
+    generate(few)
+    assert motion(few) == followed
+
+
+def test_few_keys_that_have_begun_to_become_many_are_given_back(few: Any) -> None:
+    before, here = motion(few), seen(few)
+    half_written(few)
+    settings_of(few).live = False
+    live.finish_following()
+    assert motion(few) == before
+    assert not actions.is_edited(action_of(few))
+    bpy.context.scene.frame_set(bpy.context.scene.frame_current)
+    assert apart(seen(few), here) < 1e-6
+
+
 def test_few_keys_that_are_half_written_are_given_back(slowly: Any) -> None:
     dense = few_on_their_way(slowly)
     for _ in range(3):

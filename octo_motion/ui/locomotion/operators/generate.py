@@ -253,8 +253,13 @@ class _LiveMotions(Live):
         motion = work.motion
         # What keys on their way to the action change is no change to follow; Blender works the
         # frame out anew with them, which takes longer than the keys.
+        if work.known:
+            # While it plays, nothing of it is to be half written.
+            seconds = np.inf if plays() else 0.5 * seconds
         with self.deaf() if work.known else nullcontext():
-            there = work.job.work(0.5 * seconds if work.known else seconds)
+            there = work.job.work(seconds)
+            if work.known:
+                motion.cover(armature)
         if motion.has_news:
             with self.deaf():
                 motion.tell(armature)

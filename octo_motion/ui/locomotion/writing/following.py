@@ -92,7 +92,9 @@ class Following:
         """Whether the action is what it will be, or nearly so."""
         self._few = locomotion_settings(armature).keys == "REDUCED"
         self._frame: float | None = None
-        """The one in sight, none while nothing is shown."""
+        """The one in sight, none while nothing is shown …"""
+        self._given: dict[str, list[float]] = {}
+        """… and what is shown there, by data path."""
         self._news: tuple[float, Sequence[Glimpsed]] | None = None
         """What has come to be known of a frame."""
 
@@ -142,6 +144,15 @@ class Following:
         new = [path for path in values if path not in self.shown.before]
         self.shown.before.update(shown_values(armature, new))
         show_values(armature, values)
+        self._given = values
+
+    def cover(self, armature: bpy.types.Object) -> None:
+        """Show the frame in sight again, where Blender has worked it out from an action that is
+        half written.
+        """
+        if self.shown.half is not None and self.shown.half.is_seen:
+            bpy.context.view_layer.update()
+            show_values(armature, self._given)
 
     def _stretched(self, armature: bpy.types.Object) -> set[str]:
         """Paths of scales and locations of the arms' bones that a motion before has moved."""
@@ -239,13 +250,13 @@ class Following:
         if previous is None:
             return
         half = self.shown.half = self.shown.half or HalfWritten(previous)
-        # Few keys are as good as those on all frames, which are there by now.
-        seen = self._written
         for _ in half.filling(
             made.frames,
             made.channels,
             automatic=made.automatic,
-            seen=seen,
+            # Few keys are as good as those on all frames, which are there by now.
+            nearly=self._written,
+            seen=self._frame is not None,
             repeats=self.shot.job.repeats,
         ):
             yield 1.0
