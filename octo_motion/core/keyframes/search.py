@@ -107,9 +107,10 @@ class Search:
             done = _TIDYING * (1.0 - 0.85**attempt)
             yield done
             if attempt == _JOINING:
-                self._join(_JOINED)
+                yield from evenly(self._joining(_JOINED), done)
             if attempt >= _JOINING:
                 own, joint = self._off()
+                yield done
                 if max(own.max(), joint.max()) <= _KEPT:
                     break
                 self._mend(own, joint, limit, pin=attempt >= _MENDING)
@@ -117,7 +118,7 @@ class Search:
                 yield done
             yield from evenly(self._fit(_STEPS), done)
         yield _TIDYING
-        self._tidy()
+        yield from evenly(self._tidying(), _TIDYING)
         yield 1.0
         return self._as_keys()
 
@@ -145,8 +146,10 @@ class Search:
         targets = self._model.targets.reshape(4, -1)
         self._chosen[:, self._curves.pins] = targets[:, self._curves.pinned]
 
-    def _join(self, bound: float) -> None:
-        """Bring the handles of keys into line where errors stay below a share of their bounds."""
+    def _joining(self, bound: float) -> Generator[None, None, None]:
+        """Bring the handles of keys into line where errors stay below a share of their bounds, in
+        steps.
+        """
         before, chosen, kept = self._curves, self._chosen, self._smooth
         self._smooth = np.ones(kept.shape, dtype=bool)
         while True:
@@ -163,13 +166,15 @@ class Search:
             if not len(ends):
                 return
             self._smooth[curves.tracks[ends], curves.frames[ends]] = False
+            yield
 
-    def _tidy(self) -> None:
-        """Bring into line what may be, now that all is within its bounds."""
+    def _tidying(self) -> Generator[None, None, None]:
+        """Bring into line what may be, now that all is within its bounds; in steps."""
         if not self._holds():
             return
         before = self._curves, self._chosen, self._smooth
-        self._join(_KEPT)
+        yield
+        yield from self._joining(_KEPT)
         if not self._holds():
             self._curves, self._chosen, self._smooth = before
 
@@ -327,7 +332,7 @@ def fitting(
         return curves.gathered(model.pull(change, weighted, weights[0]))
 
     yield
-    eased = _eased(curves, model.weights(stiff[0]))
+    eased = yield from _easing(curves, model.weights(stiff[0]))
     yield
     rest = -gradient(off, errors, pulls)
     turned = eased(rest)
@@ -350,9 +355,9 @@ def fitting(
     return total
 
 
-def _eased(curves: Curves, weight: Singles) -> Callable[[Singles], Singles]:
+def _easing(curves: Curves, weight: Singles) -> Generator[None, None, Callable[[Singles], Singles]]:
     """What nearly solves the system of tracks by themselves, whose values weigh so much (tracks,
-    frames): the choices of some keys at a time.
+    frames): the choices of some keys at a time. In steps.
     """
     blocks = -(-curves.size // _BLOCK)
     matrix = np.zeros((blocks, _BLOCK, _BLOCK), dtype=np.float32)
@@ -366,6 +371,7 @@ def _eased(curves: Curves, weight: Singles) -> Callable[[Singles], Singles]:
             matrix[rows // _BLOCK, rows % _BLOCK, columns % _BLOCK] += both
             if one != two:
                 matrix[rows // _BLOCK, columns % _BLOCK, rows % _BLOCK] += both
+        yield
     place = np.arange(_BLOCK)
     diagonal = matrix[:, place, place]
     # What is not free, and what fills up the last block, is by itself.
