@@ -56,6 +56,8 @@ _PLACES: Final = ("co", "handle_left", "handle_right")
 CHANNELS_AT_ONCE: Final = 6
 """How many get their keys at one step, while Blender goes on: with 700 frames that is a millisecond
 or so."""
+_SEEN_AT_ONCE: Final = 3
+"""The same where Blender may look at each of them, and works the frame out again."""
 _CURVES_AT_ONCE: Final = 50
 """How many are read at one step to see whether they have been edited."""
 _TOLD_AT_ONCE: Final = 20
@@ -722,10 +724,13 @@ class HalfWritten:
             points[:, 1] = channel.values[:, component]
             return _fill_dense(curve, points, kinds)
 
-        for start in range(0, len(channels), CHANNELS_AT_ONCE):
+        done = 0
+        while done < len(channels):
             yield
             curves = self._curves()
-            for channel in channels[start : start + CHANNELS_AT_ONCE]:
+            some = channels[done : done + (_SEEN_AT_ONCE if self.is_seen else CHANNELS_AT_ONCE)]
+            done += len(some)
+            for channel in some:
                 for component in range(channel.values.shape[1]):
                     place = channel.data_path, component
                     count = len(times) if channel.keys is None else len(channel.keys)

@@ -81,6 +81,7 @@ def searching(part: Part) -> Generator[float, None, Found]:
     search = Search(part.fine, part.keyed, part.corners, loops=part.loops, ends=part.ends)
     yield 0.0
     keys = yield from search.found()
+    yield 1.0
     return keys, search.held
 
 
