@@ -859,8 +859,9 @@ def test_few_keys_become_many_a_few_curves_at_a_time_and_the_frame_in_sight_stay
     name, work = as_written(few)
     shown, turns = seen(few), 0
     most = 4 * max(actions.CHANNELS_AT_ONCE, actions._SEEN_AT_ONCE)
+    now = motion(few)
     while live._state.following.get(name) is work:
-        last = motion(few)
+        last = now
         live._state.go_on(name, 0.0)
         now = motion(few)
         changed = sum(now[place] != last[place] for place in now)
