@@ -54,8 +54,9 @@ _RANGE: Final = ("use_frame_range", "frame_start", "frame_end", "use_cyclic")
 _PLACES: Final = ("co", "handle_left", "handle_right")
 """All that is kept of a key."""
 CHANNELS_AT_ONCE: Final = 6
-"""How many get their keys at one step, while Blender goes on: with 700 frames that is a millisecond
-or so."""
+"""How many get their keys at one step at most, while Blender goes on …"""
+_FRAMES_AT_ONCE: Final = 2_500
+"""… and how many frames all of them together, of a long motion: a few milliseconds."""
 _SEEN_AT_ONCE: Final = 3
 """The same where Blender may look at each of them, and works the frame out again."""
 _CURVES_AT_ONCE: Final = 50
@@ -724,11 +725,11 @@ class HalfWritten:
             points[:, 1] = channel.values[:, component]
             return _fill_dense(curve, points, kinds)
 
-        done = 0
+        done, at_once = 0, max(1, min(CHANNELS_AT_ONCE, _FRAMES_AT_ONCE // len(times)))
         while done < len(channels):
             yield
             curves = self._curves()
-            some = channels[done : done + (_SEEN_AT_ONCE if self.is_seen else CHANNELS_AT_ONCE)]
+            some = channels[done : done + min(at_once, _SEEN_AT_ONCE if self.is_seen else at_once)]
             done += len(some)
             for channel in some:
                 for component in range(channel.values.shape[1]):
