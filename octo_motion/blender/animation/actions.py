@@ -725,11 +725,12 @@ class HalfWritten:
             points[:, 1] = channel.values[:, component]
             return _fill_dense(curve, points, kinds)
 
-        done, at_once = 0, max(1, min(CHANNELS_AT_ONCE, _FRAMES_AT_ONCE // len(times)))
+        done, of_frames = 0, max(_FRAMES_AT_ONCE // len(times), 1)
         while done < len(channels):
             yield
             curves = self._curves()
-            some = channels[done : done + min(at_once, _SEEN_AT_ONCE if self.is_seen else at_once)]
+            most = _SEEN_AT_ONCE if self.is_seen else CHANNELS_AT_ONCE
+            some = channels[done : done + min(most, of_frames)]
             done += len(some)
             for channel in some:
                 for component in range(channel.values.shape[1]):

@@ -675,12 +675,17 @@ def half_written(armature: Any) -> dict[Any, Any]:
     return before
 
 
+def assert_given_back(armature: Any, before: dict[Any, Any]) -> None:
+    """Switched off, its action has the keys that it had."""
+    settings_of(armature).live = False
+    live.finish_following()
+    assert motion(armature) == before
+    assert not actions.is_edited(action_of(armature))
+
+
 def test_an_action_that_is_half_written_is_given_back(slowly: Any) -> None:
     before = half_written(slowly)
-    settings_of(slowly).live = False
-    live.finish_following()
-    assert motion(slowly) == before
-    assert not actions.is_edited(action_of(slowly))
+    assert_given_back(slowly, before)
 
 
 def test_an_action_that_is_half_written_is_given_back_where_the_next_one_cannot_be(
@@ -779,10 +784,7 @@ def test_curves_that_came_new_go_again_where_the_action_is_given_back(stiff: Any
     before = motion(stiff)
     all_but_written(stiff)
     assert motion(stiff).keys() > before.keys()
-    settings_of(stiff).live = False
-    live.finish_following()
-    assert motion(stiff) == before
-    assert not actions.is_edited(action_of(stiff))
+    assert_given_back(stiff, before)
 
 
 def test_bones_that_come_to_pass_their_scale_on_otherwise_are_followed(octopus: Any) -> None:
@@ -881,10 +883,7 @@ def test_few_keys_become_many_a_few_curves_at_a_time_and_the_frame_in_sight_stay
 def test_few_keys_that_have_begun_to_become_many_are_given_back(few: Any) -> None:
     before, here = motion(few), seen(few)
     half_written(few)
-    settings_of(few).live = False
-    live.finish_following()
-    assert motion(few) == before
-    assert not actions.is_edited(action_of(few))
+    assert_given_back(few, before)
     bpy.context.scene.frame_set(bpy.context.scene.frame_current)
     assert apart(seen(few), here) < 1e-6
 
@@ -894,10 +893,7 @@ def test_few_keys_that_are_half_written_are_given_back(slowly: Any) -> None:
     for _ in range(3):
         live._state.go_on(slowly.name, 0.0)
     assert motion(slowly) != dense
-    settings_of(slowly).live = False
-    live.finish_following()
-    assert motion(slowly) == dense
-    assert not actions.is_edited(action_of(slowly))
+    assert_given_back(slowly, dense)
 
 
 def test_a_drag_while_an_action_is_half_written_is_followed(slowly: Any) -> None:

@@ -216,8 +216,8 @@ def handing_over_arms(
                 arms.in_contact[number][chosen[gone[:, number]]] = False
         rows, columns = np.nonzero(gone)
         arms.late[chosen[rows], columns] = arms.misses[chosen[rows], columns] = 0.0
-        yield
         arms.cycles[chosen[rows], columns] = -_UNHEARD + hand.moment
+        yield
 
 
 def _bump(shares: Floats) -> Floats:
