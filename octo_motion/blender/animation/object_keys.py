@@ -42,18 +42,20 @@ class ObjectKeys(PoseKeys):
         scene = bpy.context.scene
         assert scene is not None
         known = len(self._noted)
-        self._prepare(item)
-        how = keying_options(scene, auto=auto), key_type(scene)
         channels = ("location", rotation_property(item.rotation_mode))
-        done = [self._insert(item, each, frame, _GROUP, how) for each in channels]
-        if any(done):
-            self.count += 1
-            mark_file_changed()
-            return True
-        if len(self._noted) > known:
+        self._prepare(item, (channels, frame))
+        options = keying_options(scene, auto=auto)
+        if self._blends(item):
+            # What is there to be keyed is in the motion beneath.
+            options.discard("INSERTKEY_AVAILABLE")
+        how = options, key_type(scene)
+        keyed = [each for each in channels if self._insert(item, each, frame, _GROUP, how)]
+        done = bool(keyed)
+        if not done and len(self._noted) > known:
             # No action is left behind that nothing went into.
             self.drop_last(item)
-        return False
+        self._inserted(item, frame, any_done=done)
+        return done
 
     def insert_path(
         self,

@@ -38,7 +38,7 @@ from .actions import (
     writable_object,
 )
 from .fcurves import KeyArrays, bezier_arrays, read_keys, replace_stretch, write_keys
-from .pose_layers import BLENDING, blend_about, is_dense
+from .pose_layers import BLENDING, blend_about, bone_paths, is_dense
 
 Target = Literal["CURRENT", "COPY", "LAYER", "CHOSEN"]
 
@@ -87,14 +87,15 @@ class _Layer:
     """What single keys go to where the action itself has keys on every frame."""
 
     blend: float
-    bones: list[str]
+    paths: tuple[str, ...]
+    """How the data paths begin of what gets keys."""
     frame: float
 
     def is_needed(self, data: bpy.types.AnimData) -> bool:
         action, slot = data.action, data.action_slot
         if action is None or slot is None or BLENDING in action:
             return False
-        return is_dense(action, slot, self.bones, self.frame)
+        return is_dense(action, slot, self.paths, self.frame)
 
 
 class PoseKeys:
@@ -153,11 +154,9 @@ class PoseKeys:
         scene = bpy.context.scene
         assert scene is not None
         known = len(self._noted)
-        self._prepare(armature, ([each.bone for each in bones], frame))
+        self._prepare(armature, (bone_paths(each.bone for each in bones), frame))
         options, kind = keying_options(scene, auto=auto), key_type(scene)
-        action, slot = _assigned(armature)
-        blends = BLENDING in action
-        if blends:
+        if self._blends(armature):
             # What is there to be keyed is in the motion beneath.
             options.discard("INSERTKEY_AVAILABLE")
         active = scene.keying_sets_all.active
@@ -183,12 +182,7 @@ class PoseKeys:
         if not done and len(self._noted) > known:
             # No action is left behind that nothing went into.
             self.drop_last(armature)
-        if done:
-            self.count += 1
-            mark_file_changed()
-            if blends:
-                blend_about(action, slot, self._noted[-1].curves, frame)
-        self.layered = self._noted[-1].beneath if done and blends else ""
+        self._inserted(armature, frame, any_done=bool(done))
         return [name for name in done if name]
 
     def check_motion(self, armature: bpy.types.Object) -> None:
@@ -272,11 +266,11 @@ class PoseKeys:
     # --- Where keys go ----------------------------------------------------------------------
 
     def _prepare(
-        self, armature: bpy.types.Object, near: tuple[list[str], float] | None = None
+        self, armature: bpy.types.Object, near: tuple[tuple[str, ...], float] | None = None
     ) -> None:
         """Note how things are, and give the armature the action that keys go to.
 
-        Bones that are to get a single key at a frame are near.
+        What is to get a single key at a frame, by how its data paths begin, is near.
 
         Raises:
             WriteError: there is none that could be written; nothing has changed then.
@@ -307,6 +301,21 @@ class PoseKeys:
         self._noted.append(before)
 
     # --- Single keys ------------------------------------------------------------------------
+
+    def _blends(self, armature: bpy.types.Object) -> bool:
+        """Whether keys go to a layer over an action that has some on every frame."""
+        return BLENDING in _assigned(armature)[0]
+
+    def _inserted(self, armature: bpy.types.Object, frame: float, *, any_done: bool) -> None:
+        """See to what goes with keys at a frame, if there are any."""
+        self.layered = ""
+        if not any_done:
+            return
+        self.count += 1
+        mark_file_changed()
+        if self._blends(armature):
+            blend_about(*_assigned(armature), self._noted[-1].curves, frame)
+            self.layered = self._noted[-1].beneath
 
     def _note(self, armature: bpy.types.Object, path: str) -> None:
         """Keep the curves of a property as they were before their first key."""

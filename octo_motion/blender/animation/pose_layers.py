@@ -8,7 +8,7 @@ frames before and after.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 from typing import Final
 
 import bpy
@@ -30,11 +30,17 @@ _NOTHING: Final = 1e-6
 """By which values are off those that change nothing."""
 
 
+def bone_paths(bones: Iterable[str]) -> tuple[str, ...]:
+    """How the data paths of bones begin."""
+    return tuple(f'pose.bones["{bpy.utils.escape_identifier(each)}"]' for each in bones)
+
+
 def is_dense(
-    action: bpy.types.Action, slot: bpy.types.ActionSlot, bones: Collection[str], frame: float
+    action: bpy.types.Action, slot: bpy.types.ActionSlot, starts: tuple[str, ...], frame: float
 ) -> bool:
-    """Whether curves of some of the bones have keys on all frames about one, on both sides."""
-    starts = tuple(f'pose.bones["{bpy.utils.escape_identifier(each)}"]' for each in bones)
+    """Whether curves whose data paths begin in one of some ways have keys on all frames about one,
+    on both sides.
+    """
     for curve in curves_of(action, slot):
         if not curve.data_path.startswith(starts) or len(curve.keyframe_points) < 2 * _NEAR:
             continue

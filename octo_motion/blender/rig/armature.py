@@ -1014,8 +1014,8 @@ def _radii(distance: Floats, along: Floats, otherwise: Floats) -> Floats:
     return np.interp(places, places[known], radii[known])
 
 
-def set_rotation(bone: bpy.types.PoseBone, turn: Quaternion) -> None:
-    """Turn a bone in its own rotation mode, on from the values that it has."""
+def set_rotation(bone: bpy.types.PoseBone | bpy.types.Object, turn: Quaternion) -> None:
+    """Turn a bone or an object in its own rotation mode, on from the values that it has."""
     mode = bone.rotation_mode
     if mode == "QUATERNION":
         turn.make_compatible(bone.rotation_quaternion)

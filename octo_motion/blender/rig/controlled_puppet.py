@@ -20,18 +20,18 @@ from ...core.phrases import phrase
 from ...core.posing.control_fit import ControlFit
 from ...core.posing.puppet import Pose, closed, turned_bodies
 from ...core.rotations import Floats, angle_between
-from .armature import even_scale
+from .control_objects import control_of, is_object, lead_to, object_of, world_place
 from .controls import (
-    BoneValues,
     Channels,
+    ControlValues,
     Reach,
-    bone_values,
     control_names,
+    control_values,
     correction_names,
     hangs_on,
     is_correction,
     reaches,
-    set_bone_values,
+    set_all_values,
     spline_leads,
 )
 from .limb_points import LimbPoints
@@ -65,7 +65,7 @@ class _Stood:
     """A pose, and how the controls showed it."""
 
     pose: Pose
-    values: dict[str, BoneValues]
+    values: dict[str, ControlValues]
     told: str
     """What of it they could not show."""
 
@@ -100,9 +100,7 @@ class ControlledPuppet(Puppet):
 
     def read(self) -> Pose:
         armature = self.armature()
-        assert armature.pose is not None
-        bones = armature.pose.bones
-        self._origins = {name: Channels(bones[name]) for name in self._limbs}
+        self._origins = {name: Channels(control_of(armature, name)) for name in self._limbs}
         self._stood: list[_Stood] = []
         pose = super().read()
         self._go_on(pose)
@@ -117,12 +115,12 @@ class ControlledPuppet(Puppet):
             self._take(self._narrow(self._turned()), placed=False)
         if self._fit is not None:
             self._fit.step(self._points.of(pose))
-        return [each.name for each in self._moving]
+        return [name.strip() for name in self._moving]
 
     def settle(self) -> str:
         known = self._stood_before()
         if known is not None:
-            self._set(known.values)
+            set_all_values(self.armature(), known.values)
             self._go_on(self._shown() if known.told else self._goal)
             return known.told
         goal = self._points.of(self._goal)
@@ -170,7 +168,7 @@ class ControlledPuppet(Puppet):
 
     def forget(self) -> None:
         super().forget()
-        self._fit, self._moving = None, []
+        self._fit, self._moving = None, {}
 
     def with_followers(self, bodies: Iterable[int]) -> list[int]:
         return sorted(bodies)
@@ -179,26 +177,39 @@ class ControlledPuppet(Puppet):
         return False
 
     def keyed(self, bodies: Iterable[int], *, all_bones: bool = False) -> list[tuple[str, bool]]:
-        wanted, armature = set(bodies), self.armature()
-        assert armature.pose is not None
+        found = self._to_key(set(bodies), all_bones=all_bones)
+        return [(name, placed) for name, placed in found if not is_object(name)]
+
+    def leading(self) -> list[bpy.types.Object]:
+        return [object_of(name) for name in self._limbs if is_object(name)]
+
+    def keyed_objects(
+        self, bodies: Iterable[int], *, all_bones: bool = False
+    ) -> list[bpy.types.Object]:
+        found = self._to_key(set(bodies), all_bones=all_bones)
+        return [object_of(name) for name, _ in found if is_object(name)]
+
+    # --- Inside -----------------------------------------------------------------------------------
+
+    def _to_key(self, wanted: set[int], *, all_bones: bool) -> list[tuple[str, bool]]:
+        """Controls that get keys for bodies, and whether they are placed as well as turned."""
+        armature = self.armature()
         found: list[tuple[str, bool]] = []
         for name, limbs in self._limbs.items():
             origin = self._origins[name]
-            turned, placed = origin.is_moved(armature.pose.bones[name])
+            turned, placed = origin.is_moved(control_of(armature, name))
             # Controls give the pose together: what has moved is keyed whichever limb was asked for.
             asked = all_bones and limbs & wanted and not is_correction(name)
             if (wanted and (turned or placed)) or asked:
                 found.append((name, placed or (all_bones and origin.goes)))
         return found
 
-    # --- Inside -----------------------------------------------------------------------------------
-
     def _go_on(self, pose: Pose) -> None:
         """Go on from what is shown now, which is the pose from now on, as near as it is."""
         armature = self.armature()
         self._base = self._goal = pose
         self._fit: ControlFit | None = None
-        self._moving: list[Channels] = []
+        self._moving: dict[str, Channels] = {}
         self._placed = False
         self._writes = 0
         self._start = self._points.shown(armature).reshape(-1, 3)
@@ -208,14 +219,9 @@ class ControlledPuppet(Puppet):
         """Remember which values of the controls the pose is shown by."""
         self._stood.append(_Stood(self._goal, self._values(), told))
 
-    def _values(self) -> dict[str, BoneValues]:
-        bones = self.armature().pose.bones  # type: ignore[union-attr]
-        return {name: bone_values(bones[name]) for name in self._limbs}
-
-    def _set(self, values: dict[str, BoneValues]) -> None:
-        bones = self.armature().pose.bones  # type: ignore[union-attr]
-        for name, each in values.items():
-            set_bone_values(bones[name], each)
+    def _values(self) -> dict[str, ControlValues]:
+        armature = self.armature()
+        return {name: control_values(control_of(armature, name)) for name in self._limbs}
 
     def _stood_before(self) -> _Stood | None:
         """How the pose was shown before, if it was: what is undone leaves no trace."""
@@ -227,8 +233,7 @@ class ControlledPuppet(Puppet):
         From there least squares find the rest: which way a knee bends they would not turn over.
         """
         armature = self.armature()
-        assert armature.pose is not None
-        bones, now = armature.pose.bones, self._points.shown(armature).reshape(-1, 3) * self._size
+        now = self._points.shown(armature).reshape(-1, 3) * self._size
         for reach, joints in self._reaches:
             before = self._start[joints] * self._size
             after = goal.reshape(-1, 3)[joints] * self._size
@@ -240,17 +245,15 @@ class ControlledPuppet(Puppet):
                 place = self._poles[reach.pole]
                 ways[reach.pole] = _swivelled(place, before, after, self._size) - place
             for name, way in ways.items():
-                if name in self._limbs and Channels(bones[name]).goes:
-                    matrix = self._leads[name].copy()
-                    back = armature.matrix_world.to_3x3().inverted_safe()
-                    matrix.translation += back @ Vector(way.tolist())
-                    bones[name].matrix = matrix
-            self._fit, self._moving = None, []
+                if name in self._limbs and Channels(control_of(armature, name)).goes:
+                    place = Vector((self._poles[name] + way).tolist())
+                    lead_to(armature, name, place, self._leads[name])
+            self._fit, self._moving = None, {}
 
-    def _find_reaches(self, armature: bpy.types.Object) -> list[tuple[int, int]]:
+    def _find_reaches(self, armature: bpy.types.Object) -> list[tuple[int, str]]:
         """Of chains of inverse kinematics: at which joints theirs are, and what leads them.
 
-        Returns the bodies at their ends, and the bones that are their targets.
+        Returns the bodies at their ends, and the controls that are their targets.
         """
         shown = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
         assert shown.pose is not None
@@ -258,10 +261,10 @@ class ControlledPuppet(Puppet):
         points = self._start[: 2 * len(self.figure)] * self._size
         bending = spline_leads(armature) & self._limbs.keys()
         self._leading |= {each for each in bending if self._trunk not in self._limbs[each]}
-        led_bodies: list[tuple[int, int]] = []
+        led_bodies: list[tuple[int, str]] = []
         self._reaches: list[tuple[Reach, list[int]]] = []
         self._poles: dict[str, Floats] = {}
-        self._leads: dict[str, Matrix] = {}
+        self._leads: dict[str, Matrix | None] = {}
         for reach in reaches(armature):
             middle = bones[reach.chain[len(reach.chain) // 2 - 1]]
             own = (bones[reach.chain[-1]].head, middle.head, bones[reach.chain[0]].tail)
@@ -273,15 +276,15 @@ class ControlledPuppet(Puppet):
             self._reaches.append((reach, joints))
             ends = apart[2, : len(self.figure)]
             if reach.goal and ends.min() <= _SAME * self._size:
-                led_bodies.append((int(ends.argmin()), bones.find(reach.goal)))
+                led_bodies.append((int(ends.argmin()), reach.goal))
             above = self.figure.parents[joints[0] % len(self.figure)]
             led = self._needs.get(reach.goal, set()) | self._needs.get(reach.pole, set())
             self._leading |= {
                 name for name in led & set(self._limbs) if above not in self._limbs[name]
             }
             for name in {reach.goal, reach.pole} & set(self._limbs):
-                self._leads[name] = bones[name].matrix.copy()
-                self._poles[name] = np.array(world @ bones[name].head)
+                self._poles[name] = np.array(world_place(armature, name))
+                self._leads[name] = bones[name].matrix.copy() if not is_object(name) else None
         return led_bodies
 
     def _turned(self) -> set[int]:
@@ -326,54 +329,47 @@ class ControlledPuppet(Puppet):
         self._take(names, placed=True, anew=True)
         if self._fit is None:
             return off
-        own = _beginning_at(turned, [self._limbs[each.name] for each in self._moving])
+        own = _beginning_at(turned, [self._limbs[name] for name in self._moving])
         self._fit.settle(goal, self._points.hard, _CLOSE, _TOLD, own)
         found = self._misses(goal)
         if found.max() <= max(_TOLD, _WORTH * off.max()):
             return found
-        self._set(before)
+        set_all_values(self.armature(), before)
         return off
 
     def _take(self, names: list[str], *, placed: bool, anew: bool = False) -> None:
         """Let these controls be the ones that are moved; if they are already, they stay so."""
-        known = [each.name for each in self._moving]
-        if known == names and not anew and (self._placed or not placed):
+        if list(self._moving) == names and not anew and (self._placed or not placed):
             return
         self._placed = placed
         armature = self.armature()
-        assert armature.pose is not None
-        bones = armature.pose.bones
-        self._moving = [
-            Channels(
-                bones[name],
+        self._moving = {
+            name: Channels(
+                control_of(armature, name),
                 turned=not is_correction(name),
                 placed=is_correction(name)
                 or name in self._leading
                 or (placed and self._trunk in self._limbs[name]),
             )
             for name in names
-        ]
-        counts = [each.count for each in self._moving]
+        }
+        counts = [each.count for each in self._moving.values()]
         self._fit = None
         if not sum(counts):
             return
-        moving = [each.name for each in self._moving]
-        limbs = np.zeros((len(moving), 3, len(self.figure), 3), dtype=bool)
-        for row, name in enumerate(moving):
+        limbs = np.zeros((len(names), 3, len(self.figure), 3), dtype=bool)
+        for row, name in enumerate(names):
             limbs[row, :, sorted(self._limbs[name])] = True
-        needs = [self._needs[bones[bone].name] for bone in self._points.targets]
-        led = [[name in need for need in needs for _ in range(3)] for name in moving]
-        moves = np.concatenate([limbs.reshape(len(moving), -1), np.array(led, dtype=bool)], axis=1)
+        needs = [self._needs[target] for target in self._points.targets]
+        led = [[name in need for need in needs for _ in range(3)] for name in names]
+        moves = np.concatenate([limbs.reshape(len(names), -1), np.array(led, dtype=bool)], axis=1)
         self._fit = ControlFit(self._shape, counts, np.repeat(moves, counts, axis=0))
 
     def _shape(self, values: Floats) -> Floats:
-        armature = self.armature()
-        assert armature.pose is not None
-        # Bones go in the armature's own space.
-        start, own_size = 0, self._size / even_scale(armature)
-        for each in self._moving:
-            bone = armature.pose.bones[each.name]
-            each.write(bone, values[start : start + each.count], own_size)
+        armature, start = self.armature(), 0
+        for name, each in self._moving.items():
+            own = values[start : start + each.count]
+            each.write(control_of(armature, name), own, self._size)
             start += each.count
         return self._points.shown(armature)
 

@@ -18,6 +18,7 @@ from mathutils import Quaternion, Vector
 
 from ...core.rotations import Floats, angle_between, conjugate, multiply
 from .armature import acts, armature_data, driven_channels, set_rotation
+from .control_objects import Control, control_of, is_object, object_control, units_of
 
 _MECHANISM: Final = re.compile(r"(DEF|ORG|MCH|VIS)-", re.IGNORECASE)
 """Names of bones that are no controls."""
@@ -32,12 +33,13 @@ _STIFF: Final = 0.02
 """Share of that by which a joint that no control bends may seem to bend: inverse kinematics leave
 that much open."""
 
-BoneValues = dict[str, tuple[float, ...]]
-"""Of a bone's channels, by name."""
+ControlValues = dict[str, tuple[float, ...]]
+"""Of a control's channels, by name."""
 
 
 def hangs_on(armature: bpy.types.Object) -> dict[str, set[str]]:
-    """For each bone all bones on whose poses its own depends, itself among them, as it stands.
+    """For each bone all bones on whose poses its own depends, itself among them, as it stands; and
+    the objects among them that are controls, by their names as such.
 
     Constraints that are muted or without influence count for nothing.
     """
@@ -66,6 +68,8 @@ def hangs_on(armature: bpy.types.Object) -> dict[str, set[str]]:
         direct[name] |= more
     for name, read in _driven_by(armature).items():
         direct.setdefault(name, set()).update(read)
+    for name in set().union(*direct.values()) - direct.keys():
+        direct[name] = set()
     return {name: _closure(name, direct) for name in direct}
 
 
@@ -95,8 +99,8 @@ def goal_bones(armature: bpy.types.Object) -> set[str]:
 
 
 def leading_objects(armature: bpy.types.Object) -> dict[str, list[str]]:
-    """Objects that are neither bones of the armature nor carried by some, by name, with the bones
-    that inverse kinematics bend after them: no key of a bone moves those.
+    """Objects that are neither controls nor carried by bones of the armature, by name, with the
+    bones that inverse kinematics bend after them: no key of a control moves those.
     """
     assert armature.pose is not None
     found: dict[str, list[str]] = {}
@@ -119,7 +123,7 @@ class Reach:
     chain: tuple[str, ...]
     """Its bones, from the end to the root."""
     goal: str
-    """The bone that it reaches for; empty if that is none of the rig's."""
+    """The control that it reaches for; empty if that is none of the rig's."""
     pole: str
 
 
@@ -133,11 +137,18 @@ def reaches(armature: bpy.types.Object) -> list[Reach]:
             if own.type != "IK" or not acts(own):
                 continue
             chain = ik_chain(bone, own)
-            goal = own.subtarget if own.target == armature else ""
-            pole = own.pole_subtarget if own.pole_target == armature else ""
             if len(chain) > 1:
+                goal = _lead(armature, own.target, own.subtarget)
+                pole = _lead(armature, own.pole_target, own.pole_subtarget)
                 found.append(Reach(tuple(chain), goal, pole))
     return found
+
+
+def _lead(armature: bpy.types.Object, target: Any, subtarget: str) -> str:
+    """The control that a target is itself: a bone of the armature, or an object; or none."""
+    if target == armature:
+        return subtarget
+    return "" if target is None else object_control(target)
 
 
 def spline_leads(armature: bpy.types.Object) -> set[str]:
@@ -153,7 +164,7 @@ def spline_leads(armature: bpy.types.Object) -> set[str]:
 
 
 def _targets(constraint: Any, armature: str) -> set[str]:
-    """Bones of the armature, by its name, on which what a constraint follows depends."""
+    """Controls, bones of the armature by its name, on which what a constraint follows depends."""
     found: set[str] = set()
     for kind in ("", "pole_"):
         target = getattr(constraint, f"{kind}target", None)
@@ -167,8 +178,9 @@ def _targets(constraint: Any, armature: str) -> set[str]:
 def _bones_behind(
     target: Any, subtarget: str, armature: str, passed: frozenset[str] = frozenset()
 ) -> set[str]:
-    """The bone of the armature that is meant, or those that carry another object or bend it, as
-    hooks bend the curve of a spline; objects that were passed on the way are not looked at again.
+    """The bone of the armature that is meant, or another object if that is a control, and those
+    that carry it or bend it, as hooks bend the curve of a spline; objects that were passed on the
+    way are not looked at again.
     """
     if target is None or target.name in passed:
         return set()
@@ -176,6 +188,7 @@ def _bones_behind(
         return {subtarget} if subtarget else set()
     passed |= {target.name}
     found = _bones_behind(target.parent, target.parent_bone, armature, passed)
+    found |= {own for own in (object_control(target),) if own}
     for each in (*target.modifiers, *target.constraints):
         own: Any = each
         if each.type == "HOOK":
@@ -217,7 +230,7 @@ def is_correction(name: str) -> bool:
 
 
 def control_names(armature: bpy.types.Object, needed: Iterable[str]) -> list[str]:
-    """Of bones that others hang on, those that an artist moves: shown, free, and no mechanism."""
+    """Of what bones hang on, that which an artist moves: shown, free, and no mechanism."""
     return [each for each in _moved_by_hand(armature, needed) if not is_correction(each)]
 
 
@@ -242,6 +255,10 @@ def _moved_by_hand(armature: bpy.types.Object, needed: Iterable[str]) -> list[st
         and not _MECHANISM.match(bone.name)
         and is_shown(bone)
         and Channels(bone).count
+    ] + [
+        name
+        for name in sorted(filter(is_object, names))
+        if Channels(control_of(armature, name)).count
     ]
 
 
@@ -262,13 +279,13 @@ def stiff_joints(armature: bpy.types.Object, joints: Mapping[str, str], size: fl
     Args:
         armature: that can be posed.
         joints: the bone above by bone.
-        size: of the rig in the armature's own space.
+        size: of the rig in the world.
     """
     assert armature.pose is not None
     needs = hangs_on(armature)
     names = control_names(armature, set().union(*(needs[each] for each in joints)))
-    bones = [armature.pose.bones[each] for each in names]
-    values = [bone_values(each) for each in bones]
+    bones = [control_of(armature, each) for each in names]
+    values = [control_values(each) for each in bones]
     channels = [Channels(each) for each in bones]
     random = np.random.default_rng(1)
     before = _bends(armature, joints)
@@ -279,21 +296,27 @@ def stiff_joints(armature: bpy.types.Object, joints: Mapping[str, str], size: fl
         turned = angle_between(_bends(armature, joints), before)
         most = np.maximum(most, turned)
     for bone, kept in zip(bones, values, strict=True):
-        set_bone_values(bone, kept)
+        set_control_values(bone, kept)
     _bends(armature, joints)
     return {bone for bone, angle in zip(joints, most, strict=True) if angle < _STIFF * _TRIED}
 
 
-def bone_values(bone: bpy.types.PoseBone) -> BoneValues:
-    """Where a bone goes and how it turns, in all of its rotation modes."""
+def control_values(control: Control) -> ControlValues:
+    """Where a control goes and how it turns, in all of its rotation modes."""
     channels = "location", "rotation_quaternion", "rotation_axis_angle", "rotation_euler"
-    return {each: tuple(getattr(bone, each)) for each in channels}
+    return {each: tuple(getattr(control, each)) for each in channels}
 
 
-def set_bone_values(bone: bpy.types.PoseBone, values: BoneValues) -> None:
-    """Let a bone be as it was, to the last bit."""
+def set_control_values(control: Control, values: ControlValues) -> None:
+    """Let a control be as it was, to the last bit."""
     for channel, value in values.items():
-        setattr(bone, channel, value)
+        setattr(control, channel, value)
+
+
+def set_all_values(armature: bpy.types.Object, values: Mapping[str, ControlValues]) -> None:
+    """The same of several controls, by name."""
+    for name, each in values.items():
+        set_control_values(control_of(armature, name), each)
 
 
 def _bends(armature: bpy.types.Object, joints: Mapping[str, str]) -> Floats:
@@ -310,12 +333,10 @@ def _bends(armature: bpy.types.Object, joints: Mapping[str, str]) -> Floats:
 
 
 class Channels:
-    """What of a bone's pose can be moved, from how it stands: first it turns, then it goes."""
+    """What of a control can be moved, from how it stands: first it turns, then it goes."""
 
-    def __init__(
-        self, bone: bpy.types.PoseBone, *, turned: bool = True, placed: bool = True
-    ) -> None:
-        self.name = bone.name
+    def __init__(self, bone: Control, *, turned: bool = True, placed: bool = True) -> None:
+        self._units = units_of(bone)
         self._place = Vector(bone.location[:])
         self._turn = _turn(bone)
         held = np.array(bone.lock_rotation)
@@ -325,7 +346,7 @@ class Channels:
         self._euler = bone.rotation_mode not in {"QUATERNION", "AXIS_ANGLE"} and bool(held.any())
         self._turns = np.flatnonzero(~held & turned)
         free = np.zeros(0, dtype=np.int64)
-        if placed and not (bone.bone.use_connect and bone.parent is not None):
+        if placed and not _is_connected(bone):
             free = np.flatnonzero(~np.array(bone.lock_location))
         self._moves = free
 
@@ -338,8 +359,8 @@ class Channels:
     def count(self) -> int:
         return len(self._turns) + len(self._moves)
 
-    def write(self, bone: bpy.types.PoseBone, values: Floats, size: float) -> None:
-        """Move the bone by values (count,): radians, and shares of a size."""
+    def write(self, bone: Control, values: Floats, size: float) -> None:
+        """Move the control by values (count,): radians, and shares of a size, metres."""
         turn = np.zeros(3)
         turn[self._turns] = values[: len(self._turns)]
         if self._euler:
@@ -349,11 +370,11 @@ class Channels:
             more = Quaternion(turn.tolist(), angle) if angle > 0.0 else Quaternion()
             set_rotation(bone, self._turn @ more)
         place = np.array(self._place, dtype=np.float64)
-        place[self._moves] += size * values[len(self._turns) :]
+        place[self._moves] += self._units * size * values[len(self._turns) :]
         if len(self._moves):
             bone.location = place.tolist()
 
-    def is_moved(self, bone: bpy.types.PoseBone) -> tuple[bool, bool]:
+    def is_moved(self, bone: Control) -> tuple[bool, bool]:
         """Whether it is turned, and whether it is elsewhere, than it was."""
         turned = self._turn.rotation_difference(_turn(bone)).angle
         return min(turned, 2.0 * np.pi - turned) > 1e-4, (
@@ -361,5 +382,20 @@ class Channels:
         )
 
 
-def _turn(bone: bpy.types.PoseBone) -> Quaternion:
-    return bone.matrix_basis.to_quaternion()
+def _turn(control: Control) -> Quaternion:
+    if isinstance(control, bpy.types.PoseBone):
+        return control.matrix_basis.to_quaternion()
+    # By its own values: the matrix of an object has its delta transform as well.
+    if control.rotation_mode == "QUATERNION":
+        return control.rotation_quaternion.normalized()
+    if control.rotation_mode == "AXIS_ANGLE":
+        angle, *axis = np.array(control.rotation_axis_angle).tolist()
+        return Quaternion(axis, angle)
+    return control.rotation_euler.to_quaternion()
+
+
+def _is_connected(bone: Control) -> bool:
+    """Whether it is a bone that goes where its parent ends."""
+    if not isinstance(bone, bpy.types.PoseBone):
+        return False
+    return bone.bone.use_connect and bone.parent is not None

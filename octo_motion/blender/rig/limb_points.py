@@ -13,6 +13,7 @@ import numpy as np
 from ...core.posing.puppet import SIZE, Pose, closed
 from ...core.rotations import Floats, conjugate, rotate
 from .armature import armature_data
+from .control_objects import is_object, world_place
 from .puppet_reading import PuppetRig
 
 _TWIST: Final = 0.01
@@ -33,21 +34,24 @@ class LimbPoints:
         bones = armature_data(armature).bones
         self._numbers = np.array([bones.find(each) for each in rig.figure.names])
         self._lengths = rig.skeleton.lengths[list(rig.roles.bodies)][:, None]
-        self._led: list[tuple[int, int]] = []
+        self._led: list[tuple[int, str]] = []
+        self._goals: list[int] = []
 
     @property
-    def targets(self) -> list[int]:
-        """Bones that are targets."""
-        return [bone for _, bone in self._led]
+    def targets(self) -> list[str]:
+        """Controls that are targets, bones first."""
+        return [name for _, name in self._led]
 
     @property
     def hard(self) -> int:
         """Numbers of heads and ends, which come first."""
         return 6 * len(self._numbers)
 
-    def match(self, armature: bpy.types.Object, pose: Pose, led: list[tuple[int, int]]) -> None:
+    def match(self, armature: bpy.types.Object, pose: Pose, led: list[tuple[int, str]]) -> None:
         """Take what is shown for a pose, and which bodies go to which targets."""
-        self._led = led
+        led = sorted(led, key=lambda each: is_object(each[1]))
+        bones, self._led = armature_data(armature).bones, led
+        self._goals = [bones.find(name) for _, name in led if not is_object(name)]
         points, count = self.shown(armature).reshape(-1, 3) * self.size, len(self._numbers)
         heads, ends, sides = points[: 3 * count].reshape(3, -1, 3)
         back = conjugate(pose.orientations)
@@ -78,9 +82,11 @@ class LimbPoints:
         heads = own[:, :3, 3]
         ends = heads + self._lengths * own[:, :3, 1]
         sides = heads + _TWIST * self._lengths * own[:, :3, 0]
-        points = np.concatenate([heads, ends, sides, every[self.targets, :3, 3]])
+        points = np.concatenate([heads, ends, sides, every[self._goals, :3, 3]])
         world = np.array(shown.matrix_world, dtype=np.float64)
-        return (points @ world[:3, :3].T + world[:3, 3]).ravel() / self.size
+        points = points @ world[:3, :3].T + world[:3, 3]
+        others = [world_place(armature, each) for each in self.targets[len(self._goals) :]]
+        return np.concatenate([points, np.array(others).reshape(-1, 3)]).ravel() / self.size
 
     def limbs_of(self, points: Floats) -> Floats:
         """Heads and ends (2, bodies, 3) of all points (numbers,)."""

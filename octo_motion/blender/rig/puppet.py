@@ -133,6 +133,27 @@ class Puppet:
         """Bones that get keys for bodies, and whether they are placed as well as turned."""
         return [(self.figure.names[body], self.places(body)) for body in bodies]
 
+    def leading(self) -> list[bpy.types.Object]:
+        """Objects through which limbs are posed, as bones that are controls are.
+
+        Raises:
+            RigError: one is gone.
+        """
+        return []
+
+    def keyed_objects(
+        self,
+        bodies: Iterable[int],  # noqa: ARG002
+        *,
+        all_bones: bool = False,  # noqa: ARG002
+    ) -> list[bpy.types.Object]:
+        """Those of them that get keys for bodies.
+
+        Raises:
+            RigError: one is gone.
+        """
+        return []
+
     def places(self, body: int) -> bool:
         """Whether a body's bone is placed by its location too, not only turned."""
         return bool(self._places[body])

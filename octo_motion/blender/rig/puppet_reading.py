@@ -96,7 +96,8 @@ class PuppetRig:
     unit: float
     """Puppet metres of one metre in the world: every puppet is simulated at the same size."""
     needs: Mapping[str, frozenset[str]] = field(default_factory=dict)
-    """Where limbs are posed through controls: for each limb's bone all bones that it depends on."""
+    """Where limbs are posed through controls: for each limb's bone all bones that it depends on,
+    and the objects among these that are controls."""
 
     def body(self, bone: str, armature: str) -> int:
         """The body of a bone, or the one that a helper bone follows.
@@ -186,7 +187,7 @@ def _roles(
     needs = hangs_on(armature)
     bent = frozenset(bent_bones(armature))
     facts = replace(facts, carried={name: _carriers(name, needs, bent) for name in facts.moved})
-    controls = set(control_names(armature, skeleton.names))
+    controls = set(control_names(armature, set().union(*needs.values())))
     controlled = replace(
         facts,
         controls={name: len(needs[name] & controls) for name in skeleton.names},
@@ -223,7 +224,7 @@ def _bending(
     }
     if not joints:
         return roles
-    size = float(np.ptp(skeleton.heads, axis=0).max())
+    size = float(np.ptp(skeleton.heads, axis=0).max()) * even_scale(armature)
     stiff = stiff_joints(armature, joints, size)
     if not stiff:
         return roles

@@ -18,7 +18,7 @@ from .grasp_target import (
     read_places,
 )
 from .imports import NOTE, ImportedClip, Up, import_clip, remove_clips
-from .loose_objects import LooseObject
+from .loose_objects import LooseObject, put_transform, transform_of
 from .octopus import add_octopus, own_collection
 from .surfaces import (
     is_enabled,
@@ -54,6 +54,7 @@ __all__ = [
     "part_of_pose",
     "place_clip",
     "put_back",
+    "put_transform",
     "read_form",
     "read_ground_mesh",
     "read_markers",
@@ -67,5 +68,6 @@ __all__ = [
     "room_of",
     "show_selected",
     "suggested_control_points",
+    "transform_of",
     "write_markers",
 ]

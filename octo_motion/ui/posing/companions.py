@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is posed beside a figure in its session, other figures and loose objects: their keys, and
-how they were before.
+"""What is posed beside a figure's bones in its session, other figures, loose objects and objects
+that lead limbs: their keys, and how they were before.
 """
 
 from __future__ import annotations
@@ -20,7 +20,14 @@ from ...blender.animation import (
     writable_armature,
 )
 from ...blender.rig import Puppet, bone_materials, is_part_of, puppet_of, read_rig
-from ...blender.scene import Company, LooseObject, check_partner, part_of_pose
+from ...blender.scene import (
+    Company,
+    LooseObject,
+    check_partner,
+    part_of_pose,
+    put_transform,
+    transform_of,
+)
 from ...core.errors import OctoMotionError
 from ...core.posing.puppet import Elements, Pose, elements_for
 from ...core.posing.session import Session
@@ -110,28 +117,66 @@ class Companions:
             self._keys.append(keys)
             self._values.append(pose_values(armature))
         self._object_keys = [ObjectKeys(each.found()) for each in company.things]
+        self._leads = {
+            each.name: (ObjectKeys(each), transform_of(each))
+            for puppet in self._puppets()
+            for each in puppet.leading()
+        }
+        """Of objects that lead limbs: their keys, and what they were like at first."""
         self._recordings: list[Recording | ObjectRecording] = []
+        self.layered = ""
+        """The action of an object with a key on every frame over which the last keys lie, if they
+        do."""
 
     # --- Keys -----------------------------------------------------------------------------------
+
+    def objects_among(self, keyed: Iterable[str]) -> int:
+        """How many of those that ``insert`` tells are objects."""
+        names = {each.name for each in self._company.things} | self._leads.keys()
+        return len(names.intersection(keyed))
 
     def insert(
         self, bodies: Iterable[int], frame: float, *, auto: bool = False, all_bones: bool = False
     ) -> list[str]:
-        """Key those of the bodies that are beside the figure; what got a key, by its names."""
+        """Key those of the bodies that are beside the figure, and the objects that lead limbs; what
+        got a key, by its names.
+        """
         wanted, done = set(bodies), []
+        self.layered = ""
+        own = wanted.intersection(self._company.own)
+        done += self._insert_leads(self._company.main, own, frame, auto=auto, all_bones=all_bones)
         for (partner, span), keys in zip(self._company.partners_with(), self._keys, strict=True):
             own = [each - span[0] for each in sorted(wanted.intersection(span))]
             puppet = partner.puppet
+            if not own and not all_bones:
+                continue
+            done += self._insert_leads(puppet, own, frame, auto=auto, all_bones=all_bones)
             keyed = [Keyed(*each) for each in puppet.keyed(own, all_bones=all_bones)]
-            if not keyed or not (own or all_bones):
+            if not keyed:
                 continue
             armature = puppet.armature()
             with pose_kept(armature):
                 inserted = keys.insert(armature, keyed, frame, auto=auto)
             done += [f"{puppet.name}: {each}" for each in inserted]
         for (thing, body), keys in zip(self._company.things_with(), self._object_keys, strict=True):
-            if body in wanted and keys.insert_object(thing.found(), frame, auto=auto):
+            if body in wanted and self._insert_object(keys, thing.found(), frame, auto=auto):
                 done.append(thing.name)
+        return done
+
+    def _insert_leads(
+        self, puppet: Puppet, bodies: Iterable[int], frame: float, *, auto: bool, all_bones: bool
+    ) -> list[str]:
+        return [
+            each.name
+            for each in puppet.keyed_objects(bodies, all_bones=all_bones)
+            if self._insert_object(self._leads[each.name][0], each, frame, auto=auto)
+        ]
+
+    def _insert_object(
+        self, keys: ObjectKeys, item: bpy.types.Object, frame: float, *, auto: bool
+    ) -> bool:
+        done = keys.insert_object(item, frame, auto=auto)
+        self.layered = keys.layered or self.layered
         return done
 
     # --- A motion ---------------------------------------------------------------------------------
@@ -198,3 +243,13 @@ class Companions:
                 thing.restore()
             except OctoMotionError:
                 continue
+        for name, (keys, before) in self._leads.items():
+            item = bpy.data.objects.get((name, None))
+            if item is not None:
+                keys.take_back(item)
+                put_transform(item, before)
+
+    # --- Inside -----------------------------------------------------------------------------------
+
+    def _puppets(self) -> list[Puppet]:
+        return [self._company.main, *(each.puppet for each in self._company.partners)]

@@ -146,8 +146,8 @@ def moved_otherwise(session: PuppetSession) -> Iterator[Phrase]:
         yield phrase("Constraints or drivers move {driven} of its bones", driven=driven)
     for name, bones in leading_objects(session.puppet.armature()).items():
         yield phrase(
-            "'{object}' leads {count} of its bones ('{example}') and is none itself: move it, or "
-            "mute the constraint.",
+            "'{object}' leads {count} of its bones ('{example}'), and is no empty that is shown "
+            "and free to be moved: no pull reaches it. Move it, or mute the constraint.",
             object=name,
             count=len(bones),
             example=bones[0],

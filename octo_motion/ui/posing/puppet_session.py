@@ -349,13 +349,13 @@ class KeyedPuppet(PosedPuppet):
     def words_for(self, keyed: list[str]) -> str:
         """Which bones got keys now, or why none did, for people."""
         if keyed:
-            things = len({each.name for each in self.puppet.things}.intersection(keyed))
+            things = self.companions.objects_among(keyed)
             told = phrase(
                 "Keyed {bones} at frame {frame}",
                 bones=_bones_and_things(len(keyed) - things, things),
                 frame=self.scene().frame_current,
             )
-            if beneath := self.keys.layered:
+            if beneath := self.keys.layered or self.companions.layered:
                 over = phrase(
                     ", in a layer over {beneath}, which has keys on every frame", beneath=beneath
                 )

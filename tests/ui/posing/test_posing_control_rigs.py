@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from mathutils import Euler, Matrix, Vector
 
 from octo_motion.core.errors import RigError
 from octo_motion.core.rotations import Floats
@@ -76,6 +77,43 @@ def by_object(**settings: Any) -> Any:
         setattr(ik, name, value)
     bpy.context.view_layer.update()
     return armature
+
+
+def by_empties() -> Any:
+    """The leg reaches for an empty, and its knee points at another."""
+    armature = by_object()
+    ik: Any = armature.pose.bones["shin"].constraints[0]
+    pole = bpy.data.objects.new("Pole", None)
+    bpy.context.collection.objects.link(pole)
+    pole.location = armature.pose.bones["pole"].head
+    ik.pole_target, ik.pole_subtarget = pole, ""
+    bpy.context.view_layer.update()
+    return armature
+
+
+def placed_by_empties(size: float, *, parented: bool) -> Any:
+    """The same one as large as that, elsewhere, turned; its empties hang on the armature, or do
+    not.
+    """
+    armature = by_empties()
+    armature.matrix_world = Matrix.LocRotScale((3.0, -2.0, 1.0), Euler((0.2, 0.1, 2.0)), [size] * 3)
+    for name in ("Target", "Pole"):
+        empty: Any = bpy.data.objects[name]
+        if parented:
+            empty.parent = armature
+        else:
+            empty.location = armature.matrix_world @ empty.location
+            empty.rotation_mode = "QUATERNION"
+    bpy.context.view_layer.update()
+    return armature
+
+
+EMPTIES: dict[str, Callable[[], Any]] = {
+    "as it is": by_empties,
+    "small": lambda: placed_by_empties(0.01, parented=True),
+    "large": lambda: placed_by_empties(100.0, parented=True),
+    "loose": lambda: placed_by_empties(2.5, parented=False),
+}
 
 
 def deforming(armature: Any) -> Any:
@@ -303,23 +341,182 @@ def test_weight_that_pulls_a_limb_where_its_controls_do_not_lead_comes_to_rest()
     session.cancel()
 
 
-def test_object_that_leads_a_limb_and_is_no_bone_is_named() -> None:
-    session = PuppetSession(by_object(), bpy.context.scene, clock=None)
+def test_object_that_leads_a_limb_and_is_no_empty_is_named() -> None:
+    armature = by_object()
+    armature.pose.bones["shin"].constraints[0].target = ball()
+    bpy.context.view_layer.update()
+    assert_named(armature, "Ball")
+
+
+def ball() -> Any:
+    """A mesh where the empty is."""
+    mesh = bpy.data.objects.new("Ball", bpy.data.meshes.new("Ball"))
+    bpy.context.collection.objects.link(mesh)
+    mesh.location = bpy.data.objects["Target"].location
+    return mesh
+
+
+@pytest.mark.parametrize("how", ["hidden", "constrained", "driven", "locked"])
+def test_empty_that_leads_a_limb_and_cannot_be_moved_is_named(how: str) -> None:
+    armature = by_object()
+    empty: Any = bpy.data.objects["Target"]
+    if how == "hidden":
+        empty.hide_viewport = True
+    elif how == "constrained":
+        empty.constraints.new("COPY_LOCATION").target = ball()
+    elif how == "driven":
+        empty.driver_add("location", 0).driver.expression = str(empty.location.x)
+    else:
+        empty.lock_location = empty.lock_rotation = (True, True, True)
+    bpy.context.view_layer.update()
+    assert_named(armature, "Target")
+
+
+def assert_named(armature: Any, name: str) -> None:
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
     driven, leads = map(str, moved_otherwise(session))
     session.cancel()
     assert driven == "Constraints or drivers move 2 of its bones"
-    told = "'Target' leads 2 of its bones ('shin') and is none itself: move it, or mute the"
-    assert leads == f"{told} constraint."
+    assert leads == (
+        f"'{name}' leads 2 of its bones ('shin'), and is no empty that is shown and free to be "
+        "moved: no pull reaches it. Move it, or mute the constraint."
+    )
 
 
-def test_object_that_a_bone_carries_or_that_leads_no_more_is_not_named() -> None:
-    armature = by_object()
-    empty = bpy.data.objects["Target"]
-    empty.parent, empty.parent_type, empty.parent_bone = armature, "BONE", "goal"
+@pytest.mark.parametrize("name", EMPTIES)
+def test_empties_that_lead_a_limb_get_keys_of_their_own(name: str) -> None:
+    """By joints as they are played from the keys, on rigs of other sizes and places as well."""
+    armature, scene = EMPTIES[name](), bpy.context.scene
+    size = armature.matrix_world.to_scale().x
+    scene.frame_set(10)
+    before = joints(armature, "")
+    session = PuppetSession(armature, scene, clock=None)
+    assert not [*moved_otherwise(session)]
+    session.core.change(step=4e-3)
+    way = armature.matrix_world.to_3x3() @ Vector((0.1, -0.25, 0.2))
+    drag(session, "shin", tuple(way))
+    names = session.key()
+    assert session.words_for(names).endswith("at frame 10")
+    goal = wanted(session, "")
+    session.finish()
+    assert session.missed == ""
+    assert "Target" in names
+    empties: list[Any] = [bpy.data.objects[each] for each in ("Target", "Pole") if each in names]
+    assert {each for each in names if each not in {"Target", "Pole"}} <= {"thigh", "foot"}
+    for empty in empties:
+        assert tuple(empty.animation_data.action.frame_range) == (10.0, 10.0)
+        # Only where it goes and how it turns: its size is not ours.
+        assert set(empty.scale) == {1.0}
+        empty.location, empty.rotation_euler = (3.0, 2.0, 1.0), (1.0, 0.0, 0.0)
+    for bone in armature.pose.bones:
+        bone.matrix_basis.identity()
+    scene.frame_set(11)
+    scene.frame_set(10)
+    after = joints(armature, "")
+    assert np.linalg.norm(after - before, axis=2).max() > 0.1 * size
+    assert np.linalg.norm(after[:, 0] - goal, axis=1).max() < MILLIMETRE * size
+
+
+def test_key_of_an_empty_that_is_baked_does_not_pop() -> None:
+    armature, scene = by_empties(), bpy.context.scene
+    empty: Any = bpy.data.objects["Target"]
+    place = Vector(empty.location)
+    for frame in range(1, 41):
+        empty.location = place + Vector((0.0, 0.002 * frame, 0.0))
+        empty.keyframe_insert("location", frame=frame)
+    baked = empty.animation_data.action
+    scene.frame_set(1)
+    before = np.array(empty.matrix_world.translation)
+    scene.frame_set(20)
+    session = PuppetSession(armature, scene, clock=None)
+    drag(session, "shin", (0.1, -0.25, 0.2))
+    names = session.key()
+    assert "Target" in names
+    goal = wanted(session, "")
+    told = session.words_for(names)
+    session.finish()
+    assert told.endswith(f"in a layer over {baked.name}, which has keys on every frame")
+    places = []
+    for frame in range(1, 41):
+        scene.frame_set(frame)
+        places.append(tuple(empty.matrix_world.translation))
+        if frame == 20:
+            np.testing.assert_allclose(joints(armature, "")[:, 0], goal, atol=MILLIMETRE)
+    gone = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    assert gone.max() < 0.1
+    np.testing.assert_allclose(places[0], before, atol=1e-6)
+    assert len(baked.layers[0].strips[0].channelbags[0].fcurves[0].keyframe_points) == 40
+
+
+def test_escape_puts_empties_back_and_takes_their_keys_away() -> None:
+    armature = by_empties()
+    before = {each.name: each.matrix_world.copy() for each in bpy.data.objects}
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    drag(session, "shin", (0.1, -0.25, 0.2))
+    assert "Target" in session.key()
+    assert bpy.data.objects["Target"].matrix_world != before["Target"]
+    session.cancel()
+    bpy.context.view_layer.update()
+    assert {each.name: each.matrix_world for each in bpy.data.objects} == before
+    assert not bpy.data.actions
+    assert bpy.data.objects["Target"].animation_data is None
+
+
+def test_step_back_leads_empties_back_as_well() -> None:
+    armature = by_empties()
+    empty: Any = bpy.data.objects["Target"]
+    before = tuple(empty.location)
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    drag(session, "shin", (0.1, -0.25, 0.2))
+    left = tuple(empty.location)
+    assert left != before
+    assert session.step_back()
+    assert tuple(empty.location) == before
+    assert session.step_forward()
+    assert tuple(empty.location) == left
+    session.cancel()
+
+
+def test_empty_stays_where_it_is_unless_its_limb_is_pulled() -> None:
+    armature = by_empties()
+    empty: Any = bpy.data.objects["Target"]
+    before = tuple(empty.location)
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    drag(session, "chest", (0.0, -0.2, 0.0))
+    assert session.key() == ["chest"]
+    session.finish()
+    assert tuple(empty.location) == before
+    assert empty.animation_data is None
+
+
+def test_empty_that_a_bone_carries_leads_its_limb_and_that_bone_stays() -> None:
+    armature = by_empties()
+    empty: Any = bpy.data.objects["Target"]
+    world = empty.matrix_world.copy()
+    empty.parent, empty.parent_type, empty.parent_bone = armature, "BONE", "root"
+    empty.matrix_world = world
     bpy.context.view_layer.update()
     session = PuppetSession(armature, bpy.context.scene, clock=None)
-    assert not [*moved_otherwise(session)]
+    drag(session, "shin", (0.1, -0.25, 0.2))
+    names = session.key()
+    session.finish()
+    assert session.missed == ""
+    assert "Target" in names
+    assert "root" not in names
+
+
+def test_empty_that_is_gone_in_mid_session_ends_it_with_a_sentence() -> None:
+    armature = by_empties()
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    start = session.grab_bone("shin", 1.0)
+    session.tick(TICK, start)
+    bpy.data.objects.remove(bpy.data.objects["Target"])
+    with pytest.raises(RigError, match="'Target' is gone"):
+        session.tick(TICK, start + np.array((0.1, -0.2, 0.1)))
     session.cancel()
+
+
+def test_object_that_leads_no_more_is_not_named() -> None:
     session = PuppetSession(by_object(mute=True), bpy.context.scene, clock=None)
     assert not [*moved_otherwise(session)]
     session.cancel()
@@ -386,13 +583,14 @@ def test_controls_that_each_do_little_are_moved_where_few_do_not_reach(
 CONTROLS = ("start", "near", "far", "end")
 
 
-def along_a_curve() -> Any:
-    """A tail of six limbs along a curve that four controls bend by hooks."""
+def along_a_curve(*, empties: bool) -> Any:
+    """A tail of six limbs along a curve that four controls bend by hooks, bones or empties."""
     limbs: dict[str, Any] = {"trunk": ("", (0, 0, 0.5), (0, 0, 0.8))}
     for number in range(6):
         above = f"tail{number - 1}" if number else "trunk"
         limbs[f"tail{number}"] = (above, (0.2 * number, 0, 0.5), (0.2 * number + 0.2, 0, 0.5))
-    for number, name in enumerate(CONTROLS):
+    bones = () if empties else CONTROLS
+    for number, name in enumerate(bones):
         limbs[name] = ("trunk", (0.4 * number, 0, 0.5), (0.4 * number, 0, 0.7))
     armature = rig(**limbs)
     data = bpy.data.curves.new("Curve", "CURVE")
@@ -403,11 +601,17 @@ def along_a_curve() -> Any:
     curve = bpy.data.objects.new("Curve", data)
     bpy.context.scene.collection.objects.link(curve)
     for number, name in enumerate(CONTROLS):
-        armature.data.bones[name].use_deform = False
         spline.points[number].co = (0.4 * number, 0.0, 0.5, 1.0)
         hook: Any = curve.modifiers.new(name, "HOOK")
-        hook.object, hook.subtarget = armature, name
         hook.vertex_indices_set([number])
+        if empties:
+            hook.object = bpy.data.objects.new(name, None)
+            bpy.context.scene.collection.objects.link(hook.object)
+            hook.object.location = (0.4 * number, 0.0, 0.5)
+            hook.matrix_inverse = hook.object.matrix_basis.inverted()
+            continue
+        armature.data.bones[name].use_deform = False
+        hook.object, hook.subtarget = armature, name
         hook.matrix_inverse = armature.pose.bones[name].matrix.inverted()
     constraint: Any = armature.pose.bones["tail5"].constraints.new("SPLINE_IK")
     constraint.target, constraint.chain_count = curve, 6
@@ -415,13 +619,15 @@ def along_a_curve() -> Any:
     return armature
 
 
+@pytest.mark.parametrize("empties", [False, True])
 @pytest.mark.parametrize("by", [(-0.1, -0.25, 0.2), (-0.2, 0.2, -0.1)])
 def test_tail_along_a_curve_is_posed_by_what_hooks_the_curve(
     by: tuple[float, float, float],
+    empties: bool,  # noqa: FBT001
 ) -> None:
     """Such limbs were told to be moved by constraints, and could not be taken. Four hooks cannot
     lay six limbs everywhere: what is left is told."""
-    armature = along_a_curve()
+    armature = along_a_curve(empties=empties)
     session = PuppetSession(armature, bpy.context.scene, clock=None)
     drag(session, "tail5", by)
     names = session.key()
