@@ -28,6 +28,8 @@ _Made = TypeVar("_Made")
 
 _NO_LENGTH: Final = 1e-30
 """Squares of lengths that are none, however small a rig's unit makes its bones."""
+_BARE: Final = 1e-4
+"""Share of the other one's radius up to which a capsule has no skin there."""
 _PARALLEL: Final = 1e-10
 """Square of the sine of the angle between two segments that are as good as parallel."""
 _AT_ONCE: Final = 500_000
@@ -342,7 +344,10 @@ def _depths(parts: Parts, chosen: tuple[np.ndarray, np.ndarray, np.ndarray]) -> 
     s, t, gap = nearest(p, u, q, v)
     here = (1.0 - s) * radii[0][one] + s * radii[1][one]
     there = (1.0 - t) * radii[0][other] + t * radii[1][other]
-    return (here + there - np.sqrt(dot(gap, gap))) / np.maximum(np.minimum(here, there), _NO_LENGTH)
+    overlap, smaller = here + there - np.sqrt(dot(gap, gap)), np.minimum(here, there)
+    # What has no skin there overlaps nothing, and is not some 10³⁰ of its radius deep in it.
+    bare = smaller <= _BARE * np.maximum(here, there)
+    return np.where(bare, -1.0, overlap / np.maximum(smaller, _NO_LENGTH))
 
 
 def nearest(p: Floats, u: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:

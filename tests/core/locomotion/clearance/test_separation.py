@@ -67,6 +67,14 @@ def test_depth_does_not_hang_on_the_unit_of_length(seed: int, unit: float) -> No
     assert deep(unit) == pytest.approx(deep(1.0), abs=1e-9)
 
 
+def test_a_part_without_skin_overlaps_nothing() -> None:
+    """A helper bone in the midst of the body: arms were 5·10³⁰ of its radius deep in it."""
+    zero = np.zeros((1, 3))
+    arm = capsule("arm", zero, zero + ALONG, 0.3)
+    helper = capsule("helper", zero, zero + 0.1 * HIGH, 0.0, rest=9.0)
+    assert measure_overlap([arm], [helper]).worst is None
+
+
 def test_the_worst_frame_and_the_pair_are_named() -> None:
     start = np.array([[0.0, 0.0, 5.0], [0.0, 0.0, 0.5], [0.0, 0.0, 1.0]])
     moving = capsule("moving", start, start + ALONG, 0.3, rest=9.0)
