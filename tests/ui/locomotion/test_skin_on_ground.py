@@ -104,7 +104,7 @@ def test_in_place_an_octopus_of_such_a_skin_is_where_it_began(gait: str) -> None
         assert values[0, 1] == pytest.approx(values[-1, 1], abs=1e-5), path
 
 
-@pytest.mark.parametrize("setup", ["walk", "tiptoe"])
+@pytest.mark.parametrize("setup", ["walk", "tiptoe", "settle"])
 def test_on_stairs_no_edge_cuts_an_arm_and_no_arm_snaps_over_one(
     setup: str,
     add_on: Any,  # noqa: ARG001
@@ -112,7 +112,7 @@ def test_on_stairs_no_edge_cuts_an_arm_and_no_arm_snaps_over_one(
     scene = build(setup, "stairs")
     played = record(scene.armature, moments(scene.start, scene.end))
     length, surface = referee.arm_length(played, scene.arms), Surface.of(scene.ground)
-    # 0.3 % and 0.2 %, where it was 2.9 % and 3.9 % of an arm.
+    # 0.3 %, 0.2 % and 0.5 %, where it was 2.9 %, 3.9 % and 2.3 % of an arm.
     assert referee.sink(played, surface, length).deepest.value <= 0.005
-    # 23° and 32°, where it was 48° and 36°.
+    # 23°, 19° and 13°, where it was 48° and 36° in the first two.
     assert referee.turns(played).value <= 35.0
