@@ -111,7 +111,7 @@ def leading_objects(armature: bpy.types.Object) -> dict[str, list[str]]:
                 continue
             inside = own.target == armature
             chain = ik_chain(bone, own)
-            if chain and not inside and not _bones_behind(own.target, "", armature.name):
+            if chain and not inside and not _controls_behind(own.target, "", armature.name):
                 found.setdefault(own.target.name, []).extend(chain)
     return found
 
@@ -168,34 +168,42 @@ def _targets(constraint: Any, armature: str) -> set[str]:
     found: set[str] = set()
     for kind in ("", "pole_"):
         target = getattr(constraint, f"{kind}target", None)
-        found |= _bones_behind(target, getattr(constraint, f"{kind}subtarget", ""), armature)
+        found |= _controls_behind(target, getattr(constraint, f"{kind}subtarget", ""), armature)
     for each in getattr(constraint, "targets", ()):
         if getattr(each, "weight", 1.0) > 0.0:
-            found |= _bones_behind(each.target, each.subtarget, armature)
+            found |= _controls_behind(each.target, each.subtarget, armature)
     return found
 
 
-def _bones_behind(
-    target: Any, subtarget: str, armature: str, passed: frozenset[str] = frozenset()
+def _controls_behind(
+    target: Any,
+    subtarget: str,
+    armature: str,
+    passed: frozenset[str] = frozenset(),
+    *,
+    carries: bool = False,
 ) -> set[str]:
     """The bone of the armature that is meant, or another object if that is a control, and those
-    that carry it or bend it, as hooks bend the curve of a spline; objects that were passed on the
-    way are not looked at again.
+    that carry it or bend it, as hooks bend the curve of a spline.
+
+    Objects that were passed on the way are not looked at again. What only ``carries`` others is
+    there for more than a limb, perhaps for all of a scene, and none.
     """
     if target is None or target.name in passed:
         return set()
     if target.name == armature:
         return {subtarget} if subtarget else set()
     passed |= {target.name}
-    found = _bones_behind(target.parent, target.parent_bone, armature, passed)
-    found |= {own for own in (object_control(target),) if own}
+    found = _controls_behind(target.parent, target.parent_bone, armature, passed, carries=True)
+    if not carries and (control := object_control(target)):
+        found.add(control)
     for each in (*target.modifiers, *target.constraints):
         own: Any = each
         if each.type == "HOOK":
-            found |= _bones_behind(own.object, own.subtarget, armature, passed)
+            found |= _controls_behind(own.object, own.subtarget, armature, passed, carries=carries)
         elif isinstance(each, bpy.types.Constraint) and acts(each):
             more = getattr(own, "target", None), getattr(own, "subtarget", "")
-            found |= _bones_behind(*more, armature, passed)
+            found |= _controls_behind(*more, armature, passed, carries=carries)
     return found
 
 
@@ -335,19 +343,19 @@ def _bends(armature: bpy.types.Object, joints: Mapping[str, str]) -> Floats:
 class Channels:
     """What of a control can be moved, from how it stands: first it turns, then it goes."""
 
-    def __init__(self, bone: Control, *, turned: bool = True, placed: bool = True) -> None:
-        self._units = units_of(bone)
-        self._place = Vector(bone.location[:])
-        self._turn = _turn(bone)
-        held = np.array(bone.lock_rotation)
-        if bone.rotation_mode in {"QUATERNION", "AXIS_ANGLE"} and bone.lock_rotations_4d:
-            held = held | bone.lock_rotation_w
-        self._angles = np.array(bone.rotation_euler, dtype=np.float64)
-        self._euler = bone.rotation_mode not in {"QUATERNION", "AXIS_ANGLE"} and bool(held.any())
+    def __init__(self, control: Control, *, turned: bool = True, placed: bool = True) -> None:
+        self._units = units_of(control)
+        self._place = Vector(control.location[:])
+        self._turn = _turn(control)
+        held = np.array(control.lock_rotation)
+        if control.rotation_mode in {"QUATERNION", "AXIS_ANGLE"} and control.lock_rotations_4d:
+            held = held | control.lock_rotation_w
+        self._angles = np.array(control.rotation_euler, dtype=np.float64)
+        self._euler = control.rotation_mode not in {"QUATERNION", "AXIS_ANGLE"} and bool(held.any())
         self._turns = np.flatnonzero(~held & turned)
         free = np.zeros(0, dtype=np.int64)
-        if placed and not _is_connected(bone):
-            free = np.flatnonzero(~np.array(bone.lock_location))
+        if placed and not _is_connected(control):
+            free = np.flatnonzero(~np.array(control.lock_location))
         self._moves = free
 
     @property
@@ -359,26 +367,26 @@ class Channels:
     def count(self) -> int:
         return len(self._turns) + len(self._moves)
 
-    def write(self, bone: Control, values: Floats, size: float) -> None:
+    def write(self, control: Control, values: Floats, size: float) -> None:
         """Move the control by values (count,): radians, and shares of a size, metres."""
         turn = np.zeros(3)
         turn[self._turns] = values[: len(self._turns)]
         if self._euler:
-            bone.rotation_euler = (self._angles + turn).tolist()
+            control.rotation_euler = (self._angles + turn).tolist()
         elif len(self._turns):
             angle = float(np.linalg.norm(turn))
             more = Quaternion(turn.tolist(), angle) if angle > 0.0 else Quaternion()
-            set_rotation(bone, self._turn @ more)
+            set_rotation(control, self._turn @ more)
         place = np.array(self._place, dtype=np.float64)
         place[self._moves] += self._units * size * values[len(self._turns) :]
         if len(self._moves):
-            bone.location = place.tolist()
+            control.location = place.tolist()
 
-    def is_moved(self, bone: Control) -> tuple[bool, bool]:
+    def is_moved(self, control: Control) -> tuple[bool, bool]:
         """Whether it is turned, and whether it is elsewhere, than it was."""
-        turned = self._turn.rotation_difference(_turn(bone)).angle
+        turned = self._turn.rotation_difference(_turn(control)).angle
         return min(turned, 2.0 * np.pi - turned) > 1e-4, (
-            (Vector(bone.location[:]) - self._place).length > 1e-6
+            (Vector(control.location[:]) - self._place).length > 1e-6
         )
 
 
@@ -394,8 +402,8 @@ def _turn(control: Control) -> Quaternion:
     return control.rotation_euler.to_quaternion()
 
 
-def _is_connected(bone: Control) -> bool:
+def _is_connected(control: Control) -> bool:
     """Whether it is a bone that goes where its parent ends."""
-    if not isinstance(bone, bpy.types.PoseBone):
+    if not isinstance(control, bpy.types.PoseBone):
         return False
-    return bone.bone.use_connect and bone.parent is not None
+    return control.bone.use_connect and control.parent is not None

@@ -505,6 +505,23 @@ def test_empty_that_a_bone_carries_leads_its_limb_and_that_bone_stays() -> None:
     assert "root" not in names
 
 
+def test_empty_that_carries_all_of_a_scene_is_no_control() -> None:
+    armature = by_empties()
+    whole = bpy.data.objects.new("All", None)
+    bpy.context.collection.objects.link(whole)
+    for each in (armature, bpy.data.objects["Target"], bpy.data.objects["Pole"]):
+        each.parent = whole
+    bpy.context.view_layer.update()
+    session = PuppetSession(armature, bpy.context.scene, clock=None)
+    drag(session, "shin", (0.1, -0.25, 0.2))
+    names = session.key()
+    session.finish()
+    assert session.missed == ""
+    assert "Target" in names
+    assert whole.animation_data is None
+    assert whole.matrix_world == Matrix()
+
+
 def test_empty_that_is_gone_in_mid_session_ends_it_with_a_sentence() -> None:
     armature = by_empties()
     session = PuppetSession(armature, bpy.context.scene, clock=None)
