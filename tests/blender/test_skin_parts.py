@@ -47,6 +47,12 @@ def test_a_head_reaches_as_far_as_its_skin_whatever_its_bone(
     assert np.all(radii >= 0.35)
 
 
+@pytest.mark.parametrize("form", [(0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
+def test_skin_that_is_a_line_or_a_point_is_no_part(form: tuple[float, float, float]) -> None:
+    """Arms were 5·10³⁰ of its radius deep in such a helper bone, and made way for nothing else."""
+    assert skin_parts(head((0.0, 0.0, 1.0), form), ["Head", "Bare"]) == []
+
+
 def outside(points: Any, joints: Any, radii: Any) -> Any:
     """How far (n,) points are out of a chain of capsules, less than zero for those in it."""
     found = np.full(len(points), np.inf)

@@ -586,6 +586,8 @@ _REACHED: Final = 0.02
 """Share of a part's vertices at either end that stand out of it."""
 _MUCH: Final = 1.5
 """How much larger a part about its bone may be than one about its own longest way."""
+_THREAD: Final = 1e-4
+"""Share of its length up to which a part has no thickness."""
 _BEYOND: Final = 1.1
 """Lengths of an arm's last bone that its skin reaches at least to count as going beyond it."""
 _TOP: Final = 0.8
@@ -682,8 +684,8 @@ def skin_parts(
 
     A bone's own ends tell little of that: a head is round about a bone of any length, and files of
     other programs know no tails. So a part reaches as far as its skin does along its bone, or along
-    the skin's own longest way if that makes it much smaller. Bones that no skin follows are none.
-    Returns name, joints (n, 3) and radii (n,) of each part, armature space.
+    the skin's own longest way if that makes it much smaller. Bones that no skin follows, or a mere
+    line of it, are none. Returns name, joints (n, 3) and radii (n,) of each part, armature space.
     """
     assert isinstance(armature.data, bpy.types.Armature)
     bones = armature.data.bones
@@ -702,7 +704,9 @@ def skin_parts(
         own = np.linalg.eigh(around.T @ around)[1][:, 2]
         along = (tail - head) / max(float(np.linalg.norm(tail - head)), 1e-12)
         part, other = _part(points, head, along), _part(points, middle, own)
-        parts.append((name, *(part if _volume(*part) <= _MUCH * _volume(*other) else other)))
+        joints, radii = part if _volume(*part) <= _MUCH * _volume(*other) else other
+        if radii.max() > _THREAD * np.ptp(points, axis=0).max():
+            parts.append((name, joints, radii))
     thickest = max((float(radii.max()) for _, _, radii in parts), default=0.0)
     return [(name, *_rounded(joints, radii, _ASIDE * thickest)) for name, joints, radii in parts]
 

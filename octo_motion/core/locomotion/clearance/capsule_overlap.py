@@ -344,10 +344,17 @@ def _depths(parts: Parts, chosen: tuple[np.ndarray, np.ndarray, np.ndarray]) -> 
     s, t, gap = nearest(p, u, q, v)
     here = (1.0 - s) * radii[0][one] + s * radii[1][one]
     there = (1.0 - t) * radii[0][other] + t * radii[1][other]
-    overlap, smaller = here + there - np.sqrt(dot(gap, gap)), np.minimum(here, there)
-    # What has no skin there overlaps nothing, and is not some 10³⁰ of its radius deep in it.
-    bare = smaller <= _BARE * np.maximum(here, there)
-    return np.where(bare, -1.0, overlap / np.maximum(smaller, _NO_LENGTH))
+    wide, thin = _wide_and_thin(here, there)
+    return (wide - np.sqrt(dot(gap, gap))) / np.maximum(thin, _NO_LENGTH)
+
+
+def _wide_and_thin(here: Floats, there: Floats) -> tuple[Floats, Floats]:
+    """Sums (pairs,) of two radii, and the thinner ones: what has no skin there touches nothing, and
+    is not some 10³⁰ of its radius deep in it.
+    """
+    thin, thick = np.minimum(here, there), np.maximum(here, there)
+    bare = thin <= _BARE * thick
+    return np.where(bare, 0.0, here + there), np.where(bare, thick, thin)
 
 
 def nearest(p: Floats, u: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats, Floats]:
@@ -681,6 +688,7 @@ class Touching:
             for share, which in ((s, one), (t, other))
         )
         each = self._joints - 1
+        wide, thin = _wide_and_thin(here, there)
         return Touches(
             frame=frame,
             arms=(self._owner[one], self._owner[other]),
@@ -688,8 +696,8 @@ class Touching:
             shares=(s, t),
             gap=gap,
             distance=np.sqrt(dot(gap, gap)),
-            wide=here + there,
-            thin=np.maximum(np.minimum(here, there), _TINY),
+            wide=np.maximum(wide, _TINY),
+            thin=np.maximum(thin, _TINY),
             side=self._side(frame, one, other),
             pair=one * len(self._owner) + other,
         )
