@@ -68,6 +68,17 @@ def _recorded(_options: Options) -> Any:
     return _splicing().summary(folders, _RECORDED_BASES)
 
 
+def _pairs() -> Any:
+    return importlib.import_module("tests.bench.splice_pairs")
+
+
+def _all_pairs(_options: Options) -> Any:
+    data = os.environ.get("OCTO_MOTION_DATA", "")
+    if not data or not all((Path(data) / name).is_dir() for name in _pairs().FOLDERS):
+        return None
+    return _pairs().summary(Path(data))
+
+
 def _splicing_text(found: Any) -> str:
     return _splicing().text(found)
 
@@ -94,6 +105,11 @@ SECTIONS: Final[dict[str, Section]] = {
         _splicing_said,
     ),
     "recorded": Section(_recorded, _splicing_text, _splicing_said),
+    "pairs": Section(
+        _all_pairs,
+        lambda found: _pairs().summary_text(found),
+        lambda found: _pairs().summary_said(found),
+    ),
     "device": Section(lambda _: asdict(device_loop.measure(10.0)), device_loop.text),
     "floods": Section(lambda _: device_loop.flooded(5.0), device_loop.text_flooded),
     "kills": Section(lambda _: device_loop.killed(_KILLS), device_loop.text_killed),

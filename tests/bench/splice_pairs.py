@@ -18,7 +18,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -565,16 +565,69 @@ def measured(pair: Pair, stack: str) -> list[Off]:
 
 def text(found: Sequence[Off]) -> str:
     """A row for each law."""
-    lines = [f"{'':16}{'pairs':>7}{'median':>9}{'99 %':>9}{'most':>9}{'limit':>8}{'beyond':>8}"]
+    return _table(_rows(found))
+
+
+def _rows(found: Sequence[Off]) -> list[dict[str, Any]]:
+    rows = []
     for stack, law in dict.fromkeys((each.stack, each.law) for each in found):
         chosen = [each for each in found if (each.stack, each.law) == (stack, law)]
         most = np.array([each.most for each in chosen])
-        median = float(np.median([each.median for each in chosen]))
-        lines.append(
-            f"{f'{stack}, {law}':16}{len(most):7}{median:9.3f}{np.quantile(most, 0.99):9.3f}"
-            f"{most.max():9.3f}{LIMITS[law]:8.0f}{(most > LIMITS[law]).sum():8}"
+        rows.append(
+            {
+                "law": f"{stack}, {law}",
+                "pairs": len(most),
+                "median": float(np.median([each.median for each in chosen])),
+                "nearly": float(np.quantile(most, 0.99)),
+                "most": float(most.max()),
+                "limit": LIMITS[law],
+                "beyond": int((most > LIMITS[law]).sum()),
+            }
         )
-    return "\n".join(lines)
+    return rows
+
+
+def _table(rows: Sequence[dict[str, Any]]) -> str:
+    head = f"{'':16}{'pairs':>7}{'median':>9}{'99 %':>9}{'most':>9}{'limit':>8}{'beyond':>8}"
+    return "\n".join(
+        [
+            head,
+            *(
+                f"{each['law']:16}{each['pairs']:7}{each['median']:9.3f}{each['nearly']:9.3f}"
+                f"{each['most']:9.3f}{each['limit']:8.0f}{each['beyond']:8}"
+                for each in rows
+            ),
+        ]
+    )
+
+
+_LEGEND: Final = """\
+first what is spliced, then what is measured: degrees (of the reach, percent of the arm)
+median: of all moments of a pair, and of these of all pairs; 99 %, most: of each pair's worst moment
+above: both arms and the head; travel: legs with their way"""
+
+
+def summary(data: Path, most: int = 20) -> dict[str, Any]:
+    """All pairs of the clips of a folder as JSON keeps them: a row for each law, and names of what
+    is beyond one, the worst first, so many at most.
+    """
+    found = all_measured(data, list(STACKS))
+    beyond = sorted((e for e in found if e.most > LIMITS[e.law]), key=lambda e: -e.most)
+    return {"laws": _rows(found), "beyond": [asdict(each) for each in beyond[:most]]}
+
+
+def summary_text(found: dict[str, Any]) -> str:
+    """The table, and what its columns are."""
+    return f"{_table(found['laws'])}\n\n{_LEGEND}"
+
+
+def summary_said(found: dict[str, Any]) -> list[str]:
+    """How many rows there are, and which are beyond a law."""
+    rows = sum(each["pairs"] for each in found["laws"])
+    beyond = sum(each["beyond"] for each in found["laws"])
+    said = f"Of {rows:,} measured laws on pairs {beyond or 'none'} {'is' if beyond < 2 else 'are'}"
+    names = [f"{e['base']} ← {e['clip']}, {e['law']}: {e['most']:.1f}" for e in found["beyond"]]
+    return [f"{said} beyond the limit{': ' * bool(names)}{'; '.join(names)}."]
 
 
 def main(words: Sequence[str]) -> None:
@@ -586,25 +639,29 @@ def main(words: Sequence[str]) -> None:
     data = os.environ.get("OCTO_MOTION_DATA")
     if not data:
         parser.error("OCTO_MOTION_DATA is to name the folder with the clips.")
-    with quiet_blender() as told, tempfile.TemporaryDirectory() as folder:
-        people = takes(Path(data), Path(folder))
+    found = all_measured(Path(data), arguments.stacks)
+    print(text(found))
+    for stack, law in dict.fromkeys((each.stack, each.law) for each in found):
+        beyond = [e for e in found if (e.stack, e.law) == (stack, law) and e.most > LIMITS[law]]
+        for each in sorted(beyond, key=lambda e: -e.most)[: arguments.beyond]:
+            print(f"{stack}, {law}: {each.base} <- {each.clip}: {each.most:.2f}")
+    sys.stdout.flush()
+    os._exit(0)  # Blender 4.5 may wait for ever at its own end.
+
+
+def all_measured(data: Path, stacks: Sequence[str]) -> list[Off]:
+    """All laws of some stacks on all pairs of the clips of a folder."""
+    with quiet_blender(), tempfile.TemporaryDirectory() as folder:
+        people = takes(data, Path(folder))
         with reference_poses_found_once():
-            found = [
+            return [
                 off
                 for base in people
                 for clip in people
                 if base is not clip
-                for stack in arguments.stacks
+                for stack in stacks
                 for off in measured_where_possible(Pair(base, clip), stack)
             ]
-        print(text(found), file=told)
-        for stack, law in dict.fromkeys((each.stack, each.law) for each in found):
-            beyond = [e for e in found if (e.stack, e.law) == (stack, law) and e.most > LIMITS[law]]
-            for each in sorted(beyond, key=lambda e: -e.most)[: arguments.beyond]:
-                print(f"{stack}, {law}: {each.base} <- {each.clip}: {each.most:.2f}", file=told)
-        told.flush()
-    sys.stdout.flush()
-    os._exit(0)  # Blender 4.5 may wait for ever at its own end.
 
 
 def measured_where_possible(pair: Pair, stack: str) -> list[Off]:

@@ -42,16 +42,17 @@ from .reference_feet import FootMoments, feet_at_rest
 _SAMPLES: Final = 240
 """Moments of a clip that are looked at."""
 
-_STANDING: Final = (0.75, 0.92)
+_STANDING: Final = (0.8, 0.92)
 """Of the length of legs and trunk: how far the neck is from the feet when nobody stands, and from
-where on somebody does."""
+where on somebody does. From 0.75 on, crouching moments of a dance turn its pelvis by 1.7°."""
 
 _IN_LINE: Final = (float(np.cos(np.radians(60.0))), float(np.cos(np.radians(20.0))))
 """Cosines of the angle between a leg and the trunk: of a leg that is raised, and of one to stand
 on."""
 
-_SITTING: Final = 0.05
-"""Weight of a moment at which nobody stands."""
+_SITTING: Final = 0.02
+"""Weight of a moment at which nobody stands. At 0.05 one who squats for most of a dance and stands
+up in between has its chest turned by 3.5° against other clips of the same body, and not by 2.6°."""
 
 _RAISED: Final = 0.02
 """Weight of a leg that is raised all the time."""
