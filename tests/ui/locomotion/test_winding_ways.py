@@ -53,3 +53,22 @@ def test_arms_that_take_their_time_in_a_hurry_stay_over_the_ground(seed: int) ->
     played = record(scene.armature, moments(scene.start, scene.end, 2))
     length, surface = measures.arm_length(played, scene.arms), Surface.of(scene.ground)
     assert measures.sink(played, surface, length).deepest.value <= 0.009
+
+
+@pytest.mark.parametrize(
+    ("setup", "seed"),
+    [
+        # What takes its time went through the siphon: 0.21 and 0.12 radii deep.
+        ("walk", 6),
+        ("walk", 5),
+        ("hurry", 9),
+        # What could not get to its own side stayed as deep as it was: 0.68 radii.
+        ("crawl", None),
+    ],
+)
+def test_arms_go_neither_through_each_other_nor_through_the_siphon(
+    setup: str, seed: int | None
+) -> None:
+    scene = build(setup, "bumps", way=None if seed is None else winding(seed))
+    told = {each.kind: each.value for each in scene.armature.octo_motion.locomotion.figures}
+    assert told["OVERLAP"] <= 0.05

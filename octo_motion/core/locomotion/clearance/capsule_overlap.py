@@ -744,13 +744,16 @@ def _sides(places: Floats) -> Floats:
     return apart / np.maximum(np.sqrt(np.sum(apart * apart, axis=0)), _TINY)
 
 
-def aside(touches: Touches) -> tuple[Floats, Floats]:
-    """How the one of each pair has to move against the other for them to touch no more.
+def aside(touches: Touches, *, nearest: bool = False) -> tuple[Floats, Floats]:
+    """How the one of each pair has to move against the other for them to touch no more: to the side
+    on which it belongs, or the nearest way.
 
     Unit vectors (3, touches) say which way, and how far (touches,), 0 where they are apart.
     """
     apart = touches.distance / touches.wide
     straight = touches.gap / np.maximum(touches.distance, _TINY)
+    if nearest:
+        return straight, _softly(touches, touches.wide + ROOM * touches.thin - touches.distance)
     wrong = np.maximum(-dot(straight, touches.side), 0.0)
     # From too far it is not to be told whether they have passed through each other at all.
     told = smooth_step((1.0 + NEAR - apart) / NEAR)
@@ -763,9 +766,13 @@ def aside(touches: Touches) -> tuple[Floats, Floats]:
     least = touches.wide + ROOM * touches.thin
     across = touches.distance**2 - along**2
     far = np.sqrt(np.maximum(least**2 - across, 0.0)) - along
+    return way, told * _softly(touches, far)
+
+
+def _softly(touches: Touches, far: Floats) -> Floats:
+    """How far (touches,) they are asked to go that have so far to: it begins gently."""
     soft = _SOFT * touches.thin
-    far = np.where(far > soft, far, np.maximum(far + soft, 0.0) ** 2 / (4.0 * soft))
-    return way, told * far
+    return np.where(far > soft, far, np.maximum(far + soft, 0.0) ** 2 / (4.0 * soft))
 
 
 def portions(length: int, most: int) -> list[slice]:

@@ -96,6 +96,7 @@ def separating_arms(
     frames_per_cycle: float,
     most: float,
     opened: Opened | None = None,
+    nearest: bool = False,
     cyclic: bool = False,
 ) -> Generator[float, None, Floats | None]:
     """Rotations (frames, bones, 4) of arms that have made way; none if nobody has to. In steps
@@ -113,6 +114,7 @@ def separating_arms(
         frames_per_cycle: of the gait: the shorter, the quicker arms make way.
         most: radians that an arm which makes way may turn in a frame.
         opened: where arms stand round a body that swims as it lies, none for others.
+        nearest: whether they go the nearest way, and not each to the side on which it belongs.
         cyclic: whether the last frame is the first again.
     """
     making = _Crowded.making(
@@ -126,6 +128,7 @@ def separating_arms(
         floor=_floor(travel, ground, scale),
         width=width_of(frames_per_cycle),
         most=most,
+        nearest=nearest,
         cyclic=cyclic,
     )
     return crowd.turned(rotations, moved)

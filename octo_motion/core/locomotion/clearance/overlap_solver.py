@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final, Protocol
 
 import numpy as np
@@ -164,6 +164,7 @@ def parting(
     floor: Floor | None,
     width: int,
     most: float,
+    nearest: bool = False,
     cyclic: bool = False,
 ) -> Generator[float, None, Floats | None]:
     """Joints (frames, arms, joints, 3) of arms that have made way; none if nobody has to. In steps
@@ -172,8 +173,9 @@ def parting(
     The result at a frame hangs on the frames within some reach of it, and on no state: the same
     motion gives the same result. Parts of the body have one frame, or one for each of the arms';
     ``width`` is that of the means over frames that make it smooth (``smoothing.blurred``); nobody
-    makes way by turns of more than ``most`` radians in a frame, or than there were before. Cyclic,
-    the last frame is the first again.
+    makes way by turns of more than ``most`` radians in a frame, or than there were before. They go
+    to the side on which they belong, or the ``nearest`` way. Cyclic, the last frame is the first
+    again.
     """
     every = np.arange(len(crowd.joints))
     if not len(every):
@@ -199,6 +201,7 @@ def parting(
         *(crowd, touching, np.flatnonzero(around), floor),
         width=width,
         most=most,
+        nearest=nearest,
         cyclic=cyclic,
     )
     yield 0.0
@@ -216,9 +219,9 @@ class _Asked:
     """(touches,) … and how far, as of ``aside``."""
 
     @classmethod
-    def of(cls, touches: Touches) -> _Asked:
-        """Of some that are near to each other, those that have to."""
-        way, far = aside(touches)
+    def of(cls, touches: Touches, *, nearest: bool) -> _Asked:
+        """Of some that are near to each other, those that have to, as of ``aside``."""
+        way, far = aside(touches, nearest=nearest)
         chosen = np.flatnonzero(far > 1e-6 * touches.thin)
         return cls(part_of(touches, chosen), way[:, chosen], far[chosen])
 
@@ -285,10 +288,12 @@ class _Parting:
         *,
         width: int,
         most: float,
+        nearest: bool,
         cyclic: bool,
     ) -> None:
         self._crowd, self._touching, self._floor = crowd, touching, floor
         self._around, self._most = around, most
+        self._ask = partial(_Asked.of, nearest=nearest)
         self._width, self._cyclic = width, cyclic
         self._joints = crowd.joints.copy()
         steps = np.diff(crowd.joints, axis=2)
@@ -391,7 +396,7 @@ class _Parting:
         for _ in self._touching.looking_again(self._joints):
             yield done
         found: list[_Asked] = []
-        for each in self._touching.of_each(self._joints, _Asked.of):
+        for each in self._touching.of_each(self._joints, self._ask):
             found.append(each)
             yield done
         return _Asked(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final, TypeVar
 
 import numpy as np
@@ -354,11 +355,18 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     if plan.carry is None:
         reached = yield from scaled(_reaching(plan, arms, volume, keyed, going), 0.94, 0.94)
     yield 0.96
-    making_way = _separate(plan, arms, reached, going, volume, swimming=swimming, cyclic=cyclic)
+    before, separate = arms.rotations, partial(_separate, plan, arms, reached, going, volume)
+    making_way = separate(swimming=swimming, cyclic=cyclic)
     warnings = yield from scaled(making_way, 0.96, 0.98)
     yield 0.98
     taking_time = _taking_time(plan, arms, reached, going, cyclic=cyclic)
     turning = yield from scaled(taking_time, 0.98, 0.98)
+    if arms.rotations is not before:
+        # What could not get to its own side, and what is in another's way for taking its time.
+        left = arms.rotations
+        making_way = separate(swimming=swimming, nearest=True, cyclic=cyclic)
+        yield from scaled(making_way, 0.98, 0.98)
+        turning = turning if arms.rotations is left else None
     if hands or job.in_place or job.body.trailing is not None or plan.carry is not None:
         # What plays is another motion yet.
         turning = None
@@ -738,9 +746,12 @@ def _separate(
     volume: BodyVolume | None,
     *,
     swimming: Floats | None,
+    nearest: bool = False,
     cyclic: bool,
 ) -> Steps[list[str]]:
-    """Let arms make way for each other, but for those that reach; what there is to warn of."""
+    """Let arms make way for each other, but for those that reach, to their own sides or the nearest
+    way; what there is to warn of.
+    """
     job = plan.job
     if volume is None or not job.keep_apart:
         return []
@@ -758,6 +769,7 @@ def _separate(
         frames_per_cycle=plan.stride * plan.pace.mean,
         most=fastest_turn(plan.stride * job.timing.rate, np.inf),
         opened=_opened(plan, len(arms.rotations), swimming),
+        nearest=nearest,
         cyclic=cyclic,
     )
     if moved is not None:

@@ -91,6 +91,22 @@ def test_an_arm_that_passes_through_another_is_pushed_to_one_side_all_the_while(
     assert steps.max() <= 5.0 * (through[0] - through[1])
 
 
+@given(SEEDS)
+def test_the_nearest_way_out_is_straight_and_no_longer_than_to_its_own_side(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    side = random.normal(size=3)
+    side /= np.linalg.norm(side)
+    gap = random.normal(size=(40, 3))
+    gap *= (random.uniform(0.05, 3.0, 40) / np.linalg.norm(gap, axis=1))[:, None]
+    pairs = touches(gap, side)
+    (way, far), (_, farther) = (aside(pairs, nearest=each) for each in (True, False))
+    inside = pairs.distance < pairs.wide
+    assert np.all(np.linalg.norm(gap.T + far * way, axis=0)[inside] >= 1.0)
+    assert np.all(far[inside] <= farther[inside] + 1e-12)
+    # Skin has bulged no farther than this: who is on the wrong side there is let be.
+    assert not np.any(far[pairs.distance > 1.2])
+
+
 def test_an_arm_far_on_the_wrong_side_is_let_be() -> None:
     gap = np.array([[-(1.0 + NEAR) - 0.01, 0.0, 0.0]])
     assert not np.any(aside(touches(gap, np.array([1.0, 0.0, 0.0])))[1])
