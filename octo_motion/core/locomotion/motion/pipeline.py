@@ -7,7 +7,7 @@ dropped between any two.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final, TypeVar
@@ -41,6 +41,7 @@ from ..rig import (
     easing_turns,
     fastest_turn,
     halfway_automatic,
+    keeping_where_calm,
     keeping_where_it_helps,
     object_transforms,
     root_bone_transforms,
@@ -355,18 +356,10 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     if plan.carry is None:
         reached = yield from scaled(_reaching(plan, arms, volume, keyed, going), 0.94, 0.94)
     yield 0.96
-    before, separate = arms.rotations, partial(_separate, plan, arms, reached, going, volume)
-    making_way = separate(swimming=swimming, cyclic=cyclic)
-    warnings = yield from scaled(making_way, 0.96, 0.98)
+    separate = partial(_separate, plan, arms, reached, going, volume, swimming=swimming)
+    making_way = _making_way(plan, arms, reached, going, separate, cyclic=cyclic)
+    warnings, turning = yield from scaled(making_way, 0.96, 0.98)
     yield 0.98
-    taking_time = _taking_time(plan, arms, reached, going, cyclic=cyclic)
-    turning = yield from scaled(taking_time, 0.98, 0.98)
-    if arms.rotations is not before:
-        # What could not get to its own side, and what is in another's way for taking its time.
-        left = arms.rotations
-        making_way = separate(swimming=swimming, nearest=True, cyclic=cyclic)
-        yield from scaled(making_way, 0.98, 0.98)
-        turning = turning if arms.rotations is left else None
     if hands or job.in_place or job.body.trailing is not None or plan.carry is not None:
         # What plays is another motion yet.
         turning = None
@@ -738,6 +731,51 @@ def _leading_past(
         arms.rotations = yield from keeping_off_ground(course, poses, radii, loose)
 
 
+def _making_way(
+    plan: MotionPlan,
+    arms: ArmMotion,
+    reached: Reached | None,
+    going: Travelled,
+    separate: Callable[..., Steps[list[str]]],
+    *,
+    cyclic: bool,
+) -> Steps[tuple[list[str], Floats | None]]:
+    """Let arms make way for each other and bones take their time, and what is left after that get
+    out the nearest way: what could not get to its own side, and what came to be in another's way
+    for taking its time.
+
+    What there is to warn of, and radians (moments − stride, bones) by which bones turn within a
+    frame, if nothing was moved.
+    """
+    before = arms.rotations
+    warnings = yield from separate(cyclic=cyclic)
+    limits = _turn_limits(plan, reached)
+    taking_time = _taking_time(plan, arms, reached, going, limits, cyclic=cyclic)
+    turning = yield from scaled(taking_time, 1.0, 1.0)
+    eased = arms.rotations
+    if eased is before:
+        return warnings, turning
+    yield from scaled(separate(nearest=True, cyclic=cyclic), 1.0, 1.0)
+    if arms.rotations is eased:
+        return warnings, turning
+    creature = plan.job.creature
+    keeping = keeping_where_calm(
+        frames_of_arms(creature.skeleton, creature.arms, creature.body),
+        *(eased, arms.rotations, going[1]),
+        limits=limits,
+        every=plan.stride,
+        cyclic=cyclic,
+    )
+    arms.rotations = yield from scaled(keeping, 1.0, 1.0)
+    return warnings, None
+
+
+def _turn_limits(plan: MotionPlan, reached: Reached | None) -> Floats:
+    """Radians (moments − stride, arms) that bones may turn within a frame."""
+    reaching = None if reached is None else reached.away > 0.0
+    return turn_limits(plan.job.timing.rate, plan.pace.fastest, reaching, plan.stride)
+
+
 def _separate(
     plan: MotionPlan,
     arms: ArmMotion,
@@ -782,6 +820,7 @@ def _taking_time(
     arms: ArmMotion,
     reached: Reached | None,
     going: Travelled,
+    limits: Floats,
     *,
     cyclic: bool,
 ) -> Generator[None, None, Floats | None]:
@@ -791,16 +830,14 @@ def _taking_time(
 
     Radians (moments − stride, bones) by which they turn within a frame, if none did.
     """
-    job, every, creature = plan.job, plan.stride, plan.job.creature
-    holding, reaching = np.zeros(arms.late.shape, dtype=bool), None
+    every, creature = plan.stride, plan.job.creature
+    holding = np.zeros(arms.late.shape, dtype=bool)
     if reached is not None:
         holding = np.stack([each.max(axis=1) > _FIRMLY for each in reached.held], axis=1)
-        reaching = reached.away > 0.0
     held = [
         (lying.any(axis=1) & (late <= MISS)) | own
         for lying, late, own in zip(arms.in_contact, arms.late.T, holding.T, strict=True)
     ]
-    limits = turn_limits(job.timing.rate, plan.pace.fastest, reaching, every)
     if not any(gait.poser.settings.smoothing_cycles for gait in plan.segments.gaits):
         frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
         return turns_in_world(frames, arms.rotations, going[1], every)

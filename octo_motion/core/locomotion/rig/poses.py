@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -347,6 +347,8 @@ _RESTING: Final = 0.05
 stand in a pose of the artist's would turn by 83° in a frame as the body leaves them."""
 _HELPED: Final = 0.5
 """Share of what a turn is too fast by that must be gone for bones to have been given time."""
+_SAME: Final = 1e-6
+"""Radians by which a turn may be another and still be the same."""
 
 
 def fastest_turn(rate: float, per_cycle: float) -> float:
@@ -508,16 +510,66 @@ def keeping_where_it_helps(
     Each stretch of an arm counts by itself: what cannot be helped at one place of a long way
     spoils nothing at another, and what is too fast in a hold changes nothing before and after it.
     """
+    return (
+        yield from _kept(
+            *(arms, before, eased, orientations),
+            limits=limits,
+            every=every,
+            cyclic=cyclic,
+            spoilt=lambda was, left: left > _HELPED * was or was <= 0.0,
+        )
+    )
+
+
+def keeping_where_calm(
+    arms: Sequence[ArmFrames],
+    before: Floats,
+    changed: Floats,
+    orientations: Floats,
+    *,
+    limits: Floats,
+    every: int = 1,
+    cyclic: bool = False,
+) -> Generator[None, None, Floats]:
+    """Rotations (moments, bones, 4), changed from what they were before; as before wherever an arm
+    turns by more for it than it may. In steps; arguments are as of :func:`easing_turns`, and each
+    stretch counts by itself, as there.
+    """
+    return (
+        yield from _kept(
+            *(arms, before, changed, orientations),
+            limits=limits,
+            every=every,
+            cyclic=cyclic,
+            spoilt=lambda was, left: left > max(was, 0.0) + _SAME,
+        )
+    )
+
+
+def _kept(
+    arms: Sequence[ArmFrames],
+    before: Floats,
+    changed: Floats,
+    orientations: Floats,
+    *,
+    limits: Floats,
+    every: int,
+    cyclic: bool,
+    spoilt: Callable[[float, float], bool],
+) -> Generator[None, None, Floats]:
+    """Rotations (moments, bones, 4), and as before wherever a stretch of an arm is spoilt: told by
+    what it turned by beyond the limits at most, and what it turns by beyond them now.
+    """
     then = turns_in_world(arms, before, orientations, every)
     yield
-    now = turns_in_world(arms, eased, orientations, every)
+    now = turns_in_world(arms, changed, orientations, every)
     yield
-    result, start = eased.copy(), 0
+    result, start = changed.copy(), 0
     limits = np.broadcast_to(limits, (len(then), len(arms)))
     for number, arm in enumerate(arms):
         own = slice(start, start + len(arm.bones))
         start, most = own.stop, limits[:, number, None]
-        stretches = [[each] for each in spans((before[:, own] != eased[:, own]).any(axis=(1, 2)))]
+        stretches = [[each] for each in spans((before[:, own] != changed[:, own]).any(axis=(1, 2)))]
         if cyclic and len(stretches) > 1 and _goes_round(stretches, len(before)):
             stretches = [stretches[-1] + stretches[0], *stretches[1:-1]]
         for stretch in stretches:
@@ -528,7 +580,7 @@ def keeping_where_it_helps(
                 )
                 for each in (then, now)
             )
-            if left > _HELPED * was or was <= 0.0:
+            if spoilt(was, left):
                 for first, end in stretch:
                     result[first:end, own] = before[first:end, own]
     return result
