@@ -418,7 +418,7 @@ def _handing_over(plan: MotionPlan, posed: _Posed) -> Generator[None, None, None
     over = np.any([hand.time < 1.0 for hand in posed.hands], axis=0)
     ends = [hand.moment for hand in posed.hands if hand.time[hand.moment] <= 0.0]
     over[ends] = False
-    held = [~over] * len(frames)
+    held = [~over[:, None]] * len(frames)
     before, limits = arms.rotations.copy(), turn_limits(plan.job.timing.rate, np.inf)
     above = np.ones(arms.late.shape)
     for hand in posed.hands:
@@ -834,8 +834,9 @@ def _taking_time(
     holding = np.zeros(arms.late.shape, dtype=bool)
     if reached is not None:
         holding = np.stack([each.max(axis=1) > _FIRMLY for each in reached.held], axis=1)
+    # Up to the last joint that lies: beyond it a tip still comes down, or is off already.
     held = [
-        (lying.any(axis=1) & (late <= MISS)) | own
+        (_up_to_the_last(lying) & (late <= MISS)[:, None]) | own[:, None]
         for lying, late, own in zip(arms.in_contact, arms.late.T, holding.T, strict=True)
     ]
     if not any(gait.poser.settings.smoothing_cycles for gait in plan.segments.gaits):
@@ -846,6 +847,11 @@ def _taking_time(
     if reached is not None and arms.rotations is not before:
         _hold_on(plan, arms, before, reached)
     return turning
+
+
+def _up_to_the_last(lying: np.ndarray) -> np.ndarray:
+    """Which bones (moments, bones) hold joints where they are that lie (moments, bones + 1)."""
+    return np.logical_or.accumulate(lying[:, :0:-1], axis=1)[:, ::-1]
 
 
 def _hold_on(plan: MotionPlan, arms: ArmMotion, before: Floats, reached: Reached) -> None:

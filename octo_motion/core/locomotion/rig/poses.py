@@ -386,7 +386,7 @@ def easing_turns(
         arms: in the order of their bones.
         rotations: (moments, bones, 4) of all arms, one after the other.
         orientations: (moments, 4) of the armature, world.
-        held: for each arm (moments,) whether it is to stay as it is.
+        held: for each arm (moments, bones or 1) which bones are to stay as they are.
         rate: frames per second.
         limits: how far bones may turn, of :func:`turn_limits`.
         every: at every how many moments there is a frame.
@@ -414,14 +414,15 @@ def easing_turns(
         # What holds on need not let go of what it has only rolled too fast.
         frames, rolled = taking_time.rolled(before)
         frames, share = taking_time.eased(frames, held[number])
-        some = np.flatnonzero(np.maximum(share, rolled))
+        some = np.flatnonzero(np.maximum(share.max(axis=1), rolled))
         if not len(some):
             continue
         if result is rotations:
             result = rotations.copy()
         turned = multiply(conjugate(orientations[some, None]), frames[some])
         result[some, own] = arm.to_bones(turned)
-        moved[:, number] = share
+        # What holds on is not to be moved for its tip.
+        moved[:, number] = share.min(axis=1)
         yield
     return None if result is rotations else (result, moved)
 
@@ -440,16 +441,18 @@ class _TakingTime:
     """Whether the last moment is the first again."""
 
     def eased(self, before: Floats, held: np.ndarray) -> tuple[Floats, Floats]:
-        """The frames, and how far means count in them (moments,): not while they are held
-        (moments,), but where they would pop. Next to that they see half as far as it is away: the
-        arm leaves it as it did, and does not cut through the ground.
+        """The frames, and how far means count in them (moments, bones or 1): not while they are
+        held (moments, bones or 1), but where they would pop. Next to that they see half as far as
+        it is away: the arm leaves it as it did, and does not cut through the ground.
         """
         rests = max(1, round(_RESTING * self.rate))
         loose = 1.0 - covered(held.astype(np.float64), rests, cyclic=self.cyclic)
-        frames, whole = before, np.zeros(len(before))
+        frames, whole = before, np.zeros(held.shape)
         for part in _TRIED:
             width, turning = self._width(part), _turns(frames, self.every)
-            near, torn = (self._near(turning > each * self.most, width) for each in (1.0, _TORN))
+            near, torn = (
+                self._near(turning > each * self.most, width)[:, None] for each in (1.0, _TORN)
+            )
             share = np.maximum(near * loose, torn)
             if not share.any():
                 break
@@ -468,7 +471,7 @@ class _TakingTime:
             share = self._near(_rolls(frames, self.every) > self.most, width)
             if not share.any():
                 break
-            mean, some = self._mean(frames, share, width), np.flatnonzero(share)
+            mean, some = self._mean(frames, share[:, None], width), np.flatnonzero(share)
             back = shortest_arc(along_segments(mean[some]), along_segments(before[some]))
             frames = frames.copy()
             frames[some] = multiply(back, mean[some])
@@ -488,8 +491,16 @@ class _TakingTime:
     def _mean(
         self, frames: Floats, share: Floats, width: int, *, fixed: np.ndarray | None = None
     ) -> Floats:
-        mean = blurred(frames, width, cyclic=self.cyclic, fixed=fixed)
-        return normalized(frames + share[:, None, None] * (mean - frames))
+        if fixed is None:
+            mean = blurred(frames, width, cyclic=self.cyclic)
+        else:
+            mean = np.empty_like(frames)
+            kinds, which = np.unique(fixed, axis=1, return_inverse=True)
+            which = np.broadcast_to(which.ravel(), frames.shape[1])
+            for kind, each in enumerate(kinds.T):
+                own = which == kind
+                mean[:, own] = blurred(frames[:, own], width, cyclic=self.cyclic, fixed=each)
+        return normalized(frames + share[..., None] * (mean - frames))
 
 
 def keeping_where_it_helps(

@@ -59,7 +59,7 @@ def test_a_bone_that_flips_in_the_air_takes_its_time(rate: float, degrees: float
     arms = arms_of()
     bones = len(arms[0].bones)
     rotations = flipping(np.radians(degrees), 120, len(arms), bones, 3)
-    free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
+    free = [np.zeros((FRAMES, 1), dtype=bool)] * len(arms)
     found = eased_turns(arms, rotations, STILL, free, rate=rate, limits=turn_limits(rate, SLOWLY))
     assert found is not None
     eased, changed = found
@@ -75,7 +75,7 @@ def test_a_bone_that_flips_in_the_air_takes_its_time(rate: float, degrees: float
 def test_what_is_slow_enough_is_left_alone() -> None:
     arms = arms_of()
     rotations = flipping(0.9 * FASTEST / 24.0, 120, len(arms), len(arms[0].bones), 3)
-    free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
+    free = [np.zeros((FRAMES, 1), dtype=bool)] * len(arms)
     assert (
         eased_turns(arms, rotations, STILL, free, rate=24.0, limits=turn_limits(24.0, SLOWLY))
         is None
@@ -85,7 +85,7 @@ def test_what_is_slow_enough_is_left_alone() -> None:
 def test_an_arm_that_holds_on_lets_go_only_of_what_would_pop() -> None:
     arms = arms_of()
     bones = len(arms[0].bones)
-    held = [np.ones(FRAMES, dtype=bool)] * len(arms)
+    held = [np.ones((FRAMES, 1), dtype=bool)] * len(arms)
     some = flipping(1.2 * FASTEST / 24.0, 120, len(arms), bones, 3)
     assert eased_turns(arms, some, STILL, held, rate=24.0, limits=turn_limits(24.0, SLOWLY)) is None
     found = eased_turns(
@@ -110,7 +110,7 @@ def test_an_arm_that_holds_on_takes_its_time_to_roll_and_lies_as_it_did(
     about = rotate(arm.own[3], np.array([1.0, 0.0, 0.0]))
     rotations = flipping(0.0, 120, len(arms), bones, 3)
     rotations[120:, 3] = from_axis_angle(about, np.radians(np.array(degrees)))
-    held = [np.ones(FRAMES, dtype=bool)] * len(arms)
+    held = [np.ones((FRAMES, 1), dtype=bool)] * len(arms)
     found = eased_turns(arms, rotations, STILL, held, rate=rate, limits=turn_limits(rate, SLOWLY))
     assert found is not None
     eased, moved = found
@@ -123,7 +123,7 @@ def test_an_arm_that_holds_on_takes_its_time_to_roll_and_lies_as_it_did(
 def test_a_gait_in_a_hurry_may_turn_faster() -> None:
     arms = arms_of()
     rotations = flipping(np.radians(36.0), 120, len(arms), len(arms[0].bones), 3)
-    free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
+    free = [np.zeros((FRAMES, 1), dtype=bool)] * len(arms)
     assert (
         eased_turns(arms, rotations, STILL, free, rate=24.0, limits=turn_limits(24.0, 24.0)) is None
     )
@@ -138,7 +138,7 @@ def test_an_arm_that_reaches_takes_its_time_in_a_hurry_too() -> None:
     bones = len(arms[0].bones)
     rotations = flipping(np.radians(36.0), 120, len(arms), bones, 3)
     rotations[180:, bones + 3] = rotations[120, 3]
-    free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
+    free = [np.zeros((FRAMES, 1), dtype=bool)] * len(arms)
     reaching = np.zeros((FRAMES, len(arms)), dtype=bool)
     reaching[100:150, 0] = True
     limits = turn_limits(24.0, 24.0, reaching)
@@ -155,7 +155,7 @@ def test_each_stretch_counts_by_itself() -> None:
     """What cannot be helped at one place spoils nothing at another."""
     arms = arms_of()
     bones = len(arms[0].bones)
-    free = [np.zeros(FRAMES, dtype=bool)] * len(arms)
+    free = [np.zeros((FRAMES, 1), dtype=bool)] * len(arms)
     most = FASTEST / 24.0
     # A little too fast early on, far too fast later.
     before = flipping(1.1 * most, 60, len(arms), bones, 3)
@@ -182,3 +182,20 @@ def test_a_stretch_in_which_nothing_was_too_fast_stays_as_it_was() -> None:
     np.testing.assert_array_equal(
         where_it_helps(arms, before, changed, STILL, limits=np.full((1, 1), most)), before
     )
+
+
+@pytest.mark.parametrize("rate", [24.0, 96.0])
+def test_a_tip_that_comes_down_after_its_arm_takes_its_time_and_what_lies_stays(
+    rate: float,
+) -> None:
+    arms = arms_of()
+    bones = len(arms[0].bones)
+    rotations = flipping(np.radians(50.0), 120, len(arms), bones, bones - 1)
+    held = [np.broadcast_to(np.arange(bones) < bones - 2, (FRAMES, bones))] * len(arms)
+    found = eased_turns(arms, rotations, STILL, held, rate=rate, limits=turn_limits(rate, SLOWLY))
+    assert found is not None
+    eased, moved = found
+    assert largest(eased) <= 1.001 * FASTEST / rate
+    np.testing.assert_allclose(eased[:, : bones - 2], rotations[:, : bones - 2], atol=1e-12)
+    # The arm itself holds on: it is not to be lifted for its tip.
+    assert not moved.any()
