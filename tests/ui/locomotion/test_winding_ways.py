@@ -29,7 +29,7 @@ def winding(seed: int) -> np.ndarray:
         # What a short hold peeled off turned by 41° and 39°: 24° and 28°.
         ("tiptoe", 6, 30.0, 0.008),
         ("tiptoe", 3, 30.0, 0.005),
-        # A tip that rolled as it landed turned by 87°, and by 42° as it came down after the arm: 39°.
+        # A tip that rolled as it landed turned by 87°, and by 42° as it came down last: 39°.
         ("hurry", 8, 40.0, 0.008),
         # What the body dragged on drifted by 5.5 and 3.8 % of an arm: 0.6 and 0.4 %.
         ("walk", 9, 30.0, 0.012),

@@ -190,7 +190,7 @@ def test_a_tip_that_comes_down_after_its_arm_takes_its_time_and_what_lies_stays(
 ) -> None:
     arms = arms_of()
     bones = len(arms[0].bones)
-    rotations = flipping(np.radians(50.0), 120, len(arms), bones, bones - 1)
+    rotations = flipping(1.8 * FASTEST / rate, 120, len(arms), bones, bones - 1)
     held = [np.broadcast_to(np.arange(bones) < bones - 2, (FRAMES, bones))] * len(arms)
     found = eased_turns(arms, rotations, STILL, held, rate=rate, limits=turn_limits(rate, SLOWLY))
     assert found is not None
