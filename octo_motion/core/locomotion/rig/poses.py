@@ -345,9 +345,9 @@ Hurry slides over bumps by 8 % of an arm of long bones instead of 0.6 %."""
 _RESTING: Final = 0.05
 """Seconds before and after a hold within which an arm comes to stay what it is: at once, arms that
 stand in a pose of the artist's would turn by 83° in a frame as the body leaves them."""
-_JERK: Final = np.radians(14.0) * 24.0
+_JERK: Final = np.radians(15.0) * 24.0
 """Radians a second that a bone sets out with all at once, when it is …"""
-_ABRUPT: Final = 4.0
+_ABRUPT: Final = 5.0
 """… so many times what it turned by in the frame before: who sees it takes it for a jerk."""
 _HELPED: Final = 0.5
 """Share of what a turn is too fast by that must be gone for bones to have been given time."""
