@@ -53,10 +53,10 @@ def played(setup: str, ground: str) -> tuple[Web, float]:
     return web(recording, Surface.of(scene.ground), length), through.share
 
 
-_INSIDE_OUT = {"walk": (0.035, 0.0012), "hurry": (0.178, 0.0125), "prowl": (0.048, 0.0019)}
+_INSIDE_OUT = {"walk": (0.035, 0.0012), "hurry": (0.03, 0.001), "prowl": (0.048, 0.0019)}
 """Share of the web's area that may be inside out where arms cross a neighbour, at the worst moment
-and in the mean of all: 1.6 % and 0.04 % in a walk (2.3 % and 0.08 % over bumps), 12 % and 0.8 % in
-a hurry, 3.2 % and 0.13 % in a prowl. Elsewhere no face is."""
+and in the mean of all: 3.2 % and 0.09 % in a walk, 0.8 % and 0.06 % in a hurry (2 % at some frame
+in between), 4.2 % and 0.18 % in a prowl. Elsewhere no face is."""
 
 
 @pytest.mark.parametrize(
@@ -76,5 +76,5 @@ def test_it_stays_whole_and_above_the_ground(
     worst, mean = _INSIDE_OUT.get(setup, (0.0, 0.0))
     assert found.inside_out.value <= worst
     assert found.turned_over <= mean
-    # Of few moments: 6 % in a walk, 14 % in a hurry, where an arm's own skin goes through another.
-    assert through < 0.22
+    # Of few moments: 6 % in a walk, 12 % over bumps, where an arm's own skin goes through another.
+    assert through < 0.15
