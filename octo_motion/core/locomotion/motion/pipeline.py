@@ -762,7 +762,6 @@ def _making_way(
     keeping = keeping_where_calm(
         frames_of_arms(creature.skeleton, creature.arms, creature.body),
         *(eased, arms.rotations, going[1]),
-        rate=plan.job.timing.rate,
         limits=limits,
         every=plan.stride,
         cyclic=cyclic,
@@ -915,11 +914,7 @@ def _giving_time(
         return turning
     # Where it is no help, it is no good either.
     arms.rotations = yield from keeping_where_it_helps(
-        *(frames, before, arms.rotations, going[1]),
-        rate=job.timing.rate,
-        limits=limits,
-        every=every,
-        cyclic=cyclic,
+        *(frames, before, arms.rotations, going[1]), limits=limits, every=every, cyclic=cyclic
     )
     return None
 
