@@ -11,6 +11,7 @@ import pytest
 from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_arm
 from octo_motion.core.locomotion.rig.poses import (
     easing_turns,
+    keeping_where_calm,
     keeping_where_it_helps,
     turn_limits,
 )
@@ -199,3 +200,21 @@ def test_a_tip_that_comes_down_after_its_arm_takes_its_time_and_what_lies_stays(
     np.testing.assert_allclose(eased[:, : bones - 2], rotations[:, : bones - 2], atol=1e-12)
     # The arm itself holds on: it is not to be lifted for its tip.
     assert not moved.any()
+
+
+def test_an_arm_that_makes_way_too_fast_goes_as_before_and_the_others_make_way() -> None:
+    arms = arms_of()
+    bones = len(arms[0].bones)
+    limits = turn_limits(24.0, SLOWLY)
+    before = flipping(0.0, 120, len(arms), bones, 3)
+    changed = flipping(1.2 * FASTEST / 24.0, 120, len(arms), bones, 3)
+    changed[:, bones + 3] = flipping(0.8 * FASTEST / 24.0, 60, len(arms), bones, 3)[:, 3]
+    kept = finished(keeping_where_calm(arms, before, changed, STILL, limits=limits))
+    np.testing.assert_array_equal(kept[:, :bones], before[:, :bones])
+    np.testing.assert_array_equal(kept[:, bones:], changed[:, bones:])
+    # What was as fast before is not laid at its door.
+    fast = flipping(1.2 * FASTEST / 24.0, 120, len(arms), bones, 4)
+    changed = fast.copy()
+    changed[:, 3] = from_axis_angle(np.array([1.0, 0.0, 0.0]), np.full(FRAMES, 0.1))
+    kept = finished(keeping_where_calm(arms, fast, changed, STILL, limits=limits))
+    np.testing.assert_array_equal(kept, changed)
