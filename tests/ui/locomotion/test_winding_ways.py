@@ -64,6 +64,12 @@ def test_arms_that_take_their_time_in_a_hurry_stay_over_the_ground(seed: int) ->
         ("hurry", 9),
         # What could not get to its own side stayed as deep as it was: 0.68 radii.
         ("crawl", None),
+        # Arms came down on their neighbours' feet: 0.77, 1.2, 0.73, 0.6 and 0.7 radii.
+        ("walk", 11),
+        ("walk", 16),
+        ("hurry", 11),
+        ("tiptoe", 20),
+        ("prowl", 20),
     ],
 )
 def test_arms_go_neither_through_each_other_nor_through_the_siphon(

@@ -433,14 +433,21 @@ def laying(
         uneven: … but for what holds differ by in place.
         rough: whether they are soon found, and may be a little off.
     """
-    numbers = np.arange(cycles[0], cycles[1] + 1)
-    overridden = _overridden(limbs, (len(limbs.arms), len(numbers)), cycles[0], contact_overrides)
-    late, *beside, bent = _differing(uneven, limbs, numbers)
+    # A place hangs on those of its neighbours in the cycles beside it, once for each look at them.
+    wide = np.arange(cycles[0] - _LOOKS, cycles[1] + _LOOKS + 1)
+    wanted = slice(_LOOKS, len(wide) - _LOOKS)
+    overridden = _overridden(limbs, (len(limbs.arms), len(wide)), int(wide[0]), contact_overrides)
+    late, *beside, bent = _differing(uneven, limbs, wide)
     shift, joint = overridden.shift + late, limbs.touching(settings.planted)
-    roots = _RootPath(limbs, line, timing, numbers, middle / CYCLE)
-    curl = _curls(limbs, 0 * numbers if cyclic else numbers, seed) + bent
+    roots = _RootPath(limbs, line, timing, wide, middle / CYCLE)
     spot, lie, half, firm = yield from _finding_places(roots, shift, ground, settings, beside)
     spot, heading = overridden.put(spot, np.arctan2(lie[..., 1], lie[..., 0]))
+    present = overridden.present & (firm | overridden.moved)
+    curl = _curls(limbs, 0 * wide if cyclic else wide, seed) + bent
+    shift, spot, heading, half, present, curl = (
+        each[:, wanted] for each in (shift, spot, heading, half, present, curl)
+    )
+    roots, numbers = replace(roots, numbers=wide[wanted]), wide[wanted]
     skins = _as_if_round(limbs, joint, len(numbers))
     placed = {"skins": skins, "spot": spot, "heading": heading, "curl": curl}
     joints = laid(limbs, ground, joint, **placed, rough=rough)
@@ -452,7 +459,7 @@ def laying(
         touch_down=touch_down,
         lift_off=lift_off,
         middle=middles,
-        present=overridden.present & (firm | overridden.moved),
+        present=present,
         joints=joints,
         normals=normals(ground, joints),
         skins=skins,
@@ -508,6 +515,13 @@ class _RootPath:
         share = self.line.route.share_at(self._distances(shift))
         return values_along(self.line.settings.along.hold, share, settings.duty)
 
+    def holds(self, shift: Floats, half: Floats) -> tuple[Floats, Floats]:
+        """Metres (arms, cycles) along the route at which holds begin and end, from their middles
+        and half of how long they last, (arms, cycles) in cycles.
+        """
+        begins, ends = self._distances(np.stack([shift - half, shift + half]))
+        return begins, ends
+
     def _distances(self, since: Floats) -> Floats:
         """Metres (…, arms, cycles) along the route at times since the middles of stances."""
         middles = self.middle + self.numbers.astype(np.float64)
@@ -537,12 +551,25 @@ def _finding_places(
     aside, farther = aside + beside[0], farther + beside[1] * limbs.reach[-1][:, None]
     aim, lie = rotate_in_plane(aim, aside), rotate_in_plane(lie, aside)
     yield
-    # One after the other, for the first will do for nearly all.
-    passings = (
-        (times[2], Passing(roots, path.at(shift + np.stack(times))[0]))
-        for times in stance_times(path.duty(settings, shift))
-    )
-    distance, half = spots(limbs, ground, settings, passings, aim=aim, away=away, farther=farther)
+
+    def found(aim: Floats) -> tuple[Floats, Floats]:
+        # One after the other, for the first will do for nearly all.
+        passings = (
+            (times[2], Passing(roots, path.at(shift + np.stack(times))[0]))
+            for times in stance_times(path.duty(settings, shift))
+        )
+        return spots(limbs, ground, settings, passings, aim=aim, away=away, farther=farther)
+
+    distance, half = found(aim)
+    yield
+    neighbours = Neighbours.of(limbs, *path.holds(shift, half), path.line)
+    for _ in range(_LOOKS):
+        seen = roots[..., :2] + distance[..., None] * aim
+        turned = neighbours.aside(limbs, joint, seen, lie, distance)
+        if not turned.any():
+            break
+        aim, lie = rotate_in_plane(aim, turned), rotate_in_plane(lie, turned)
+        distance, half = found(aim)
     yield
     spot = roots.copy()
     spot[..., :2] += distance[..., None] * aim
@@ -550,6 +577,103 @@ def _finding_places(
     spot, half, firm = _over_gaps(path, (shift, half), ground, settings, (spot, lie))
     yield
     return spot, lie, half, firm
+
+
+# --- Feet of neighbours ---------------------------------------------------------------------------
+#
+# A foothold is laid for its own arm, where that passes it with ease. In a bend, an arm that has
+# held on for a while is left behind as the body turns, and its neighbour, which leads, comes down
+# right on it: both hold, neither can make way, and they go through each other. So places that would
+# come too near to those of a neighbour, or beyond them, are turned away from them, both by half of
+# it, before anything moves.
+
+_ROOM: Final = 2.0
+"""Sums of both radii that are to be between them. At 1.5 arms are in each other by 0.3 radii on one
+winding way of a hurry more."""
+_LONGER: Final = 1.2
+"""Times as long as holds last for which they are counted: an arm comes down where another is just
+leaving. At 1 arms go through each other on eight of twelve winding ways still, at 1.4 on one on
+which they did not."""
+_ALONG: Final = np.array([0.0, 0.35])
+"""Where along what lies it is looked at, as shares from where an arm touches to its tip …"""
+_UNRELATED: Final = np.radians(100.0)
+"""… and how far apart, as the body sees them, places are that have nothing to do with each
+other."""
+_MOST_ASIDE: Final = np.radians(30.0)
+"""By which a place is turned about the arm's root at once."""
+_LOOKS: Final = 2
+"""How often it is looked whether they are apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """Holds of arms next to each other that meet in time: of one and of the next anticlockwise."""
+
+    arms: tuple[np.ndarray, np.ndarray]
+    """Numbers (pairs,) among the limbs …"""
+    cycles: tuple[np.ndarray, np.ndarray]
+    """… and (pairs,) of their cycles."""
+    centres: Floats
+    """(2, 1, pairs, 2) where the body is as both begin to hold and as one lets go, from above."""
+
+    @classmethod
+    def of(cls, limbs: Limbs, begins: Floats, ends: Floats, line: Line) -> Neighbours:
+        """Of holds that last from distances (arms, cycles) along the line to others."""
+        holding = np.arange(len(limbs.arms))
+        if limbs.free is not None:
+            holding = holding[~limbs.free]
+        angles = np.arctan2(limbs.roots[holding, 1], limbs.roots[holding, 0])
+        order = np.argsort(angles)
+        gaps = np.mod(np.roll(angles[order], -1) - angles[order], 2.0 * np.pi)
+        # Across the open side of those that do not stand all round, nobody is a neighbour.
+        near = (gaps > 0.0) & (gaps < np.pi)
+        one, other = holding[order][near], holding[np.roll(order, -1)][near]
+        middle, half = 0.5 * (begins + ends), 0.5 * _LONGER * (ends - begins)
+        low, high = middle - half, middle + half
+        # The other's holds in the cycle before, in the same one, and in the next.
+        beside = [
+            np.pad(each[other], ((0, 0), (1, 1)), constant_values=np.nan) for each in (low, high)
+        ]
+        shifted = np.stack([np.arange(begins.shape[1]) + step for step in range(3)])
+        first = np.maximum(low[one][:, None], beside[0][:, shifted])
+        last = np.minimum(high[one][:, None], beside[1][:, shifted])
+        pair, step, cycle = np.nonzero(last > first)
+        chosen = pair, step, cycle
+        centres = line.at(np.stack([first[chosen], last[chosen]]))[0][:, None, :, :2]
+        return cls((one[pair], other[pair]), (cycle, cycle + step - 1), centres)
+
+    def aside(
+        self, limbs: Limbs, joint: int, spots: Floats, lie: Floats, distance: Floats
+    ) -> Floats:
+        """Radians (arms, cycles), anticlockwise, by which places are to be turned about the roots.
+
+        Args:
+            limbs: the arms.
+            joint: the one that touches first.
+            spots: (arms, cycles, 2) where it does, seen from above.
+            lie: (arms, cycles, 2) unit vectors along which arms lie from there.
+            distance: (arms, cycles) metres from the roots to there.
+        """
+        lying = (limbs.reach[-1] - limbs.reach[joint])[:, None] * _ALONG
+        places, away, out = [], [], []
+        for arm, cycle in zip(self.arms, self.cycles, strict=True):
+            far = lying[arm].T
+            place = spots[arm, cycle] + far[..., None] * lie[arm, cycle]
+            places.append(place - self.centres)
+            away.append(np.linalg.norm(places[-1], axis=-1))
+            out.append(np.maximum(distance[arm, cycle] + far, 1e-9))
+        (ax, ay), (bx, by) = (np.moveaxis(each, -1, 0) for each in places)
+        between = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
+        wide = limbs.radii[joint][self.arms[0]] + limbs.radii[joint][self.arms[1]]
+        needed = _ROOM * wide / np.maximum(0.5 * (away[0] + away[1]), 1e-9)
+        lacks = np.where(np.abs(between) < _UNRELATED, np.maximum(needed - between, 0.0), 0.0)
+        back, forth = np.zeros(distance.shape), np.zeros(distance.shape)
+        for number, result in ((0, back), (1, forth)):
+            turns = np.minimum(0.5 * lacks * away[number] / out[number], _MOST_ASIDE).max(
+                axis=(0, 1)
+            )
+            np.maximum.at(result, (self.arms[number], self.cycles[number]), turns)
+        return forth - back
 
 
 def _differing(uneven: UnevenHolds | None, limbs: Limbs, cycles: np.ndarray) -> Floats:

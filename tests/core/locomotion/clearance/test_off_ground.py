@@ -13,6 +13,7 @@ from octo_motion.core.locomotion.ground.surface import LevelGround
 from octo_motion.core.locomotion.rig.bone_rotations import frames_of_arm
 from octo_motion.core.locomotion.rig.poses import Poses
 from octo_motion.core.rotations import Floats, from_axis_angle
+from octo_motion.core.smoothing import least_jerk
 from octo_motion.core.steps import finished
 from tests.core.grounds import GROUNDS, largest_turn, walker
 
@@ -62,7 +63,7 @@ def test_arms_that_are_not_loose_stay_as_they_are() -> None:
 
 
 def test_arms_that_walk_see_to_it_themselves() -> None:
-    share = np.linspace(0.0, 1.0, 101)[:, None]
+    share = least_jerk(np.linspace(0.0, 1.0, 101))[:, None]
     off, on = afloat([False, True], [share]), afloat([True, False], [share])
     assert (off[0], off[-1], on[0], on[-1]) == (0.0, 1.0, 1.0, 0.0)
     np.testing.assert_allclose(off, on[::-1], atol=1e-12)
