@@ -442,10 +442,9 @@ def laying(
     roots = _RootPath(limbs, line, timing, wide, middle / CYCLE)
     spot, lie, half, firm = yield from _finding_places(roots, shift, ground, settings, beside)
     spot, heading = overridden.put(spot, np.arctan2(lie[..., 1], lie[..., 0]))
-    present = overridden.present & (firm | overridden.moved)
     curl = _curls(limbs, 0 * wide if cyclic else wide, seed) + bent
-    shift, spot, heading, half, present, curl = (
-        each[:, wanted] for each in (shift, spot, heading, half, present, curl)
+    shift, spot, heading, half, curl = (
+        each[:, wanted] for each in (shift, spot, heading, half, curl)
     )
     roots, numbers = replace(roots, numbers=wide[wanted]), wide[wanted]
     skins = _as_if_round(limbs, joint, len(numbers))
@@ -459,7 +458,7 @@ def laying(
         touch_down=touch_down,
         lift_off=lift_off,
         middle=middles,
-        present=present,
+        present=(overridden.present & (firm | overridden.moved))[:, wanted],
         joints=joints,
         normals=normals(ground, joints),
         skins=skins,
