@@ -433,36 +433,30 @@ def laying(
         uneven: … but for what holds differ by in place.
         rough: whether they are soon found, and may be a little off.
     """
+    joint = limbs.touching(settings.planted)
     # A place hangs on those of its neighbours in the cycles beside it, once for each look at them.
     wide = np.arange(cycles[0] - _LOOKS, cycles[1] + _LOOKS + 1)
-    wanted = slice(_LOOKS, len(wide) - _LOOKS)
-    overridden = _overridden(limbs, (len(limbs.arms), len(wide)), int(wide[0]), contact_overrides)
-    late, *beside, bent = _differing(uneven, limbs, wide)
-    shift, joint = overridden.shift + late, limbs.touching(settings.planted)
     roots = _RootPath(limbs, line, timing, wide, middle / CYCLE)
-    spot, lie, half, firm = yield from _finding_places(roots, shift, ground, settings, beside)
-    spot, heading = overridden.put(spot, np.arctan2(lie[..., 1], lie[..., 0]))
-    curl = _curls(limbs, 0 * wide if cyclic else wide, seed) + bent
-    shift, spot, heading, half, curl = (
-        each[:, wanted] for each in (shift, spot, heading, half, curl)
-    )
-    roots, numbers = replace(roots, numbers=wide[wanted]), wide[wanted]
+    placed = yield from _placing(roots, ground, settings, contact_overrides, uneven)
+    placed, numbers = placed.part(slice(_LOOKS, -_LOOKS)), wide[_LOOKS:-_LOOKS]
     skins = _as_if_round(limbs, joint, len(numbers))
-    placed = {"skins": skins, "spot": spot, "heading": heading, "curl": curl}
-    joints = laid(limbs, ground, joint, **placed, rough=rough)
+    curl = _curls(limbs, 0 * numbers if cyclic else numbers, seed) + placed.bent
+    lie = {"skins": skins, "spot": placed.spots, "heading": placed.headings, "curl": curl}
+    joints = laid(limbs, ground, joint, **lie, rough=rough)
     yield
-    touch_down, lift_off, middles, (at_touch_down, at_lift_off) = _times(roots, shift, half)
+    times = _times(replace(roots, numbers=numbers), placed.shift, placed.half)
+    touch_down, lift_off, middles, (at_touch_down, at_lift_off) = times
     return Footholds(
         first=cycles[0],
         touching=joint,
         touch_down=touch_down,
         lift_off=lift_off,
         middle=middles,
-        present=(overridden.present & (firm | overridden.moved))[:, wanted],
+        present=placed.present,
         joints=joints,
         normals=normals(ground, joints),
         skins=skins,
-        headings=heading,
+        headings=placed.headings,
         curls=curl,
         peeled_to=peeled_to(limbs, joint, joints, at_lift_off, lift_off - touch_down),
         roots_at_touch_down=at_touch_down,
@@ -488,6 +482,47 @@ def _times(roots: _RootPath, shift: Floats, half: Floats) -> tuple[Floats, Float
     peeling = lift_off - PEELING * (lift_off - touch_down)
     at_ends = roots.at(np.stack([touch_down, lift_off]))[0]
     return touch_down, lift_off, 0.5 * (unrolled + peeling), at_ends
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """Where and when arms take hold, (arms, cycles) each."""
+
+    shift: Floats
+    """Cycles by which a hold is later than the gait has it …"""
+    half: Floats
+    """… and half of how long it is."""
+    spots: Floats
+    """(arms, cycles, 3) where they touch, world …"""
+    headings: Floats
+    """… and which way they lie from there, radians about Z …"""
+    bent: Floats
+    """… and by how many they are bent to one side more than usual."""
+    present: np.ndarray
+    """Whether there is one at all."""
+
+    def part(self, cycles: slice) -> _Placed:
+        """Some cycles of them."""
+        return _Placed(**{name: each[:, cycles] for name, each in vars(self).items()})
+
+
+def _placing(
+    path: _RootPath,
+    ground: Ground,
+    settings: StanceSettings,
+    contact_overrides: Sequence[ContactOverride],
+    uneven: UnevenHolds | None,
+) -> Generator[None, None, _Placed]:
+    """Where and when arms take hold, in steps: as the artist wishes, or as they do with ease."""
+    limbs, numbers = path.limbs, path.numbers
+    shape = len(limbs.arms), len(numbers)
+    overridden = _overridden(limbs, shape, int(numbers[0]), contact_overrides)
+    late, *beside, bent = _differing(uneven, limbs, numbers)
+    shift = overridden.shift + late
+    spot, lie, half, firm = yield from _finding_places(path, shift, ground, settings, beside)
+    spot, heading = overridden.put(spot, np.arctan2(lie[..., 1], lie[..., 0]))
+    present = overridden.present & (firm | overridden.moved)
+    return _Placed(shift, half, spot, heading, bent, present)
 
 
 @dataclass(frozen=True, eq=False)
