@@ -762,7 +762,6 @@ def _making_way(
     keeping = keeping_where_calm(
         frames_of_arms(creature.skeleton, creature.arms, creature.body),
         *(eased, arms.rotations, going[1]),
-        rate=plan.job.timing.rate,
         limits=limits,
         every=plan.stride,
         cyclic=cyclic,
@@ -900,25 +899,22 @@ def _giving_time(
         if eased is None:
             break
         arms.rotations, changed = eased
-        ground = _ground(plan) if number == _EASINGS - 1 else _underfoot(plan)
+        # What comes of that is jerked as little as can be: out of the ground itself, and no more.
+        last = number == _EASINGS - 1
+        ground = _ground(plan) if last else _underfoot(plan)
         if ground is not None:
             course = ArmsOverGround(frames, ground, creature.scale, cyclic=cyclic)
             poses = Poses(arms.rotations, arms.strains, *going)
             radii = [creature.scale * each for each in _radii(plan)]
-            # What was moved by little is raised by more than that, for it may stand as low as can
-            # be; but just out of the ground, for whatever is lifted is moved faster again.
-            share = above * np.cbrt(changed)
-            keeping_off = keeping_off_ground(course, poses, radii, share, closer=MARGIN)
+            closer = MARGIN if last else 0.0
+            share = above * changed
+            keeping_off = keeping_off_ground(course, poses, radii, share, closer=closer)
             arms.rotations = yield from keeping_off
     if arms.rotations is before:
         return turning
     # Where it is no help, it is no good either.
     arms.rotations = yield from keeping_where_it_helps(
-        *(frames, before, arms.rotations, going[1]),
-        rate=job.timing.rate,
-        limits=limits,
-        every=every,
-        cyclic=cyclic,
+        *(frames, before, arms.rotations, going[1]), limits=limits, every=every, cyclic=cyclic
     )
     return None
 

@@ -345,10 +345,6 @@ Hurry slides over bumps by 8 % of an arm of long bones instead of 0.6 %."""
 _RESTING: Final = 0.05
 """Seconds before and after a hold within which an arm comes to stay what it is: at once, arms that
 stand in a pose of the artist's would turn by 83° in a frame as the body leaves them."""
-_JERK: Final = np.radians(15.0) * 24.0
-"""Radians a second that a bone sets out with all at once, when it is …"""
-_ABRUPT: Final = 5.0
-"""… so many times what it turned by in the frame before: who sees it takes it for a jerk."""
 _HELPED: Final = 0.5
 """Share of what a turn is too fast by that must be gone for bones to have been given time."""
 _SAME: Final = 1e-6
@@ -409,8 +405,7 @@ def easing_turns(
     for number, arm in enumerate(arms):
         own = slice(start, start + len(arm.bones))
         start, most = own.stop, limits[:, number]
-        fast = turning[:, own] > most[:, None]
-        if not (fast.any() or _starts(turning[:, own], rate, every).any()):
+        if not (turning[:, own] > most[:, None]).any():
             continue
         before = continuous(multiply(orientations[:, None], arm.from_bones(rotations[:, own])))
         if cyclic and np.any(np.sum(before[-1] * before[0], axis=-1) < 0.0):
@@ -454,11 +449,10 @@ class _TakingTime:
         loose = 1.0 - covered(held.astype(np.float64), rests, cyclic=self.cyclic)
         frames, whole = before, np.zeros(held.shape)
         for part in _TRIED:
-            width, turning = self._width(part), _bone_turns(frames, self.every)
-            sudden = _starts(turning, self.rate / self.every, self.every).any(axis=1)
-            turning = turning.max(axis=1)
-            near = self._near((turning > self.most) | sudden, width)[:, None]
-            torn = self._near(turning > _TORN * self.most, width)[:, None]
+            width, turning = self._width(part), _turns(frames, self.every)
+            near, torn = (
+                self._near(turning > each * self.most, width)[:, None] for each in (1.0, _TORN)
+            )
             share = np.maximum(near * loose, torn)
             if not share.any():
                 break
@@ -515,7 +509,6 @@ def keeping_where_it_helps(
     eased: Floats,
     orientations: Floats,
     *,
-    rate: float,
     limits: Floats,
     every: int = 1,
     cyclic: bool = False,
@@ -531,13 +524,10 @@ def keeping_where_it_helps(
     return (
         yield from _kept(
             *(arms, before, eased, orientations),
-            rate=rate,
             limits=limits,
             every=every,
             cyclic=cyclic,
-            spoilt=lambda was, left, fewer: (
-                left > _HELPED * was if was > 0.0 else not fewer or left > _SAME
-            ),
+            spoilt=lambda was, left: left > _HELPED * was or was <= 0.0,
         )
     )
 
@@ -548,7 +538,6 @@ def keeping_where_calm(
     changed: Floats,
     orientations: Floats,
     *,
-    rate: float,
     limits: Floats,
     every: int = 1,
     cyclic: bool = False,
@@ -560,11 +549,10 @@ def keeping_where_calm(
     return (
         yield from _kept(
             *(arms, before, changed, orientations),
-            rate=rate,
             limits=limits,
             every=every,
             cyclic=cyclic,
-            spoilt=lambda was, left, _: left > max(was, 0.0) + _SAME,
+            spoilt=lambda was, left: left > max(was, 0.0) + _SAME,
         )
     )
 
@@ -578,8 +566,7 @@ def _kept(
     limits: Floats,
     every: int,
     cyclic: bool,
-    rate: float,
-    spoilt: Callable[[float, float, bool], bool],
+    spoilt: Callable[[float, float], bool],
 ) -> Generator[None, None, Floats]:
     """Rotations (moments, bones, 4), and as before wherever a stretch of an arm is spoilt: told by
     what it turned by beyond the limits at most, and what it turns by beyond them now.
@@ -588,7 +575,6 @@ def _kept(
     yield
     now = turns_in_world(arms, changed, orientations, every)
     yield
-    starts = [_starts(each, rate, every) for each in (then, now)]
     result, start = changed.copy(), 0
     limits = np.broadcast_to(limits, (len(then), len(arms)))
     for number, arm in enumerate(arms):
@@ -605,11 +591,7 @@ def _kept(
                 )
                 for each in (then, now)
             )
-            set_out, still = (
-                sum(int(each[max(first - every, 0) : end, own].sum()) for first, end in stretch)
-                for each in starts
-            )
-            if spoilt(was, left, still < set_out):
+            if spoilt(was, left):
                 for first, end in stretch:
                     result[first:end, own] = before[first:end, own]
     return result
@@ -620,20 +602,10 @@ def _goes_round(stretches: list[list[tuple[int, int]]], count: int) -> bool:
     return stretches[0][0][0] == 0 and stretches[-1][0][1] == count
 
 
-def _bone_turns(frames: Floats, every: int) -> Floats:
-    """Radians (moments − every, bones) that bones turn within a frame."""
+def _turns(frames: Floats, every: int) -> Floats:
+    """Radians (moments − every,) that the quickest of the bones turns within a frame."""
     same = np.abs(np.sum(frames[every:] * frames[:-every], axis=-1))
-    return 2.0 * np.arccos(np.minimum(same, 1.0))
-
-
-def _starts(turning: Floats, rate: float, every: int) -> np.ndarray:
-    """Where (moments − every, bones) bones that turn so (moments − every, bones), radians within a
-    frame, set out all at once, at so many frames a second.
-    """
-    result = np.zeros(turning.shape, dtype=bool)
-    after = turning[every:]
-    result[every:] = (after > _ABRUPT * turning[:-every]) & (after > _JERK / rate)
-    return result
+    return 2.0 * np.arccos(np.minimum(same, 1.0)).max(axis=1, initial=0.0)
 
 
 def _rolls(frames: Floats, every: int) -> Floats:
