@@ -630,6 +630,9 @@ leaving. At 1 arms go through each other on eight of twelve winding ways still, 
 which they did not."""
 _ALONG: Final = np.array([0.0, 0.35])
 """Where along what lies it is looked at, as shares from where an arm touches to its tip …"""
+_HOPS: Final = 2
+"""To the how manieth arm it is looked: in a bend the next but one may come down where one holds on
+while the one between them swings."""
 _UNRELATED: Final = np.radians(100.0)
 """… and how far apart, as the body sees them, places are that have nothing to do with each
 other."""
@@ -658,10 +661,13 @@ class Neighbours:
             holding = holding[~limbs.free]
         angles = np.arctan2(limbs.roots[holding, 1], limbs.roots[holding, 0])
         order = np.argsort(angles)
-        gaps = np.mod(np.roll(angles[order], -1) - angles[order], 2.0 * np.pi)
-        # Across the open side of those that do not stand all round, nobody is a neighbour.
-        near = (gaps > 0.0) & (gaps < np.pi)
-        one, other = holding[order][near], holding[np.roll(order, -1)][near]
+        pairs = []
+        for hop in range(1, min(_HOPS, len(order) - 1) + 1):
+            gaps = np.mod(np.roll(angles[order], -hop) - angles[order], 2.0 * np.pi)
+            # Across the open side of those that do not stand all round, nobody is a neighbour.
+            near = (gaps > 0.0) & (gaps < np.pi)
+            pairs.append([holding[order][near], holding[np.roll(order, -hop)][near]])
+        one, other = np.concatenate(pairs, axis=1) if pairs else np.zeros((2, 0), dtype=np.int64)
         middle, half = 0.5 * (begins + ends), 0.5 * _LONGER * (ends - begins)
         low, high = middle - half, middle + half
         # The other's holds in the cycle before, in the same one, and in the next.
