@@ -55,6 +55,13 @@ def test_arms_that_take_their_time_in_a_hurry_stay_over_the_ground(seed: int) ->
     assert measures.sink(played, surface, length).deepest.value <= 0.009
 
 
+def test_an_arm_does_not_come_down_on_the_next_but_one() -> None:
+    """While the one between them swings; they were 2.3 radii in each other."""
+    scene = build("walk", "slope", way=winding(42))
+    told = {each.kind: each.value for each in scene.armature.octo_motion.locomotion.figures}
+    assert told["OVERLAP"] <= 0.05
+
+
 @pytest.mark.parametrize(
     ("setup", "seed"),
     [
@@ -78,3 +85,11 @@ def test_arms_go_neither_through_each_other_nor_through_the_siphon(
     scene = build(setup, "bumps", way=None if seed is None else winding(seed))
     told = {each.kind: each.value for each in scene.armature.octo_motion.locomotion.figures}
     assert told["OVERLAP"] <= 0.05
+
+
+# Seven and five bones stood still for a frame and then turned by 16° to 34° in one.
+@pytest.mark.parametrize("ground", ["bumps", "slope"])
+def test_in_a_hurry_no_bone_sets_out_all_at_once(ground: str) -> None:
+    scene = build("hurry", ground)
+    played = record(scene.armature, moments(scene.start, scene.end), with_skin=False)
+    assert measures.sudden_starts(played) == 0

@@ -508,6 +508,23 @@ class ArmsOverGround:
             found.append(height.min(axis=1) / (length * self.scale))
         return np.stack(found, axis=1)
 
+    def room(self, poses: Poses, radii: Sequence[Floats]) -> Floats:
+        """Arm lengths (moments, arms) that the lowest skin of each arm is above the ground, at each
+        moment and half way to those before and after it.
+
+        Radii are metres from each joint (joints,) of an arm to the skin below it.
+        """
+        found = np.full((len(poses.rotations), len(self.arms)), np.inf)
+        for each in (poses, halfway_automatic(poses, cyclic=self.cyclic)):
+            for number, own in enumerate(self.joints(each)):
+                length = self.arms[number].length * self.scale
+                height = own[:, 1:, 2] - self.ground.height(own[:, 1:]) - radii[number][1:]
+                lowest = height.min(axis=1) / length
+                for first in {0, len(found) - len(lowest)}:
+                    part = found[first : first + len(lowest), number]
+                    np.minimum(part, lowest, out=part)
+        return found
+
     def dips(self, poses: Poses, clear: Floats, arms: Sequence[int] | None = None) -> Floats:
         """Arm lengths (frames − 1, arms) that each one's lowest joint is below the ground half way
         between frames; 0 where it cannot be.

@@ -36,15 +36,18 @@ from ..path import Travel, bearings_of, plan_travel, travel_at
 from ..reaching import Carried, Reached, Travelling
 from ..rig import (
     MARGIN,
+    TOLERATED,
     ArmMotion,
     Poses,
     easing_turns,
     fastest_turn,
     halfway_automatic,
+    keeping_softer_starts,
     keeping_where_calm,
     keeping_where_it_helps,
     object_transforms,
     root_bone_transforms,
+    softening_starts,
     turn_limits,
     turns_in_world,
 )
@@ -843,10 +846,14 @@ def _taking_time(
         frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
         return turns_in_world(frames, arms.rotations, going[1], every)
     before = arms.rotations
-    turning = yield from _giving_time(plan, arms, going, held, limits, cyclic=cyclic)
-    if reached is not None and arms.rotations is not before:
+    around = plan, arms, going, held, limits
+    turning = yield from _giving_time(*around, cyclic=cyclic)
+    yield from _softening(*around, turning=turning, cyclic=cyclic)
+    if arms.rotations is before:
+        return turning
+    if reached is not None:
         _hold_on(plan, arms, before, reached)
-    return turning
+    return None
 
 
 def _up_to_the_last(lying: np.ndarray) -> np.ndarray:
@@ -917,6 +924,57 @@ def _giving_time(
         *(frames, before, arms.rotations, going[1]), limits=limits, every=every, cyclic=cyclic
     )
     return None
+
+
+def _softening(
+    plan: MotionPlan,
+    arms: ArmMotion,
+    going: Travelled,
+    held: Sequence[np.ndarray],
+    limits: Floats,
+    *,
+    turning: Floats | None,
+    cyclic: bool,
+) -> Generator[None, None, None]:
+    """Let bones that set out all at once do so more gently, but of arms while they are held
+    (moments, bones or 1), and where no arm comes to be in the ground for it. In steps.
+
+    They turn by so much within a frame (moments − stride, bones), if that is known.
+    """
+    creature, before, every = plan.job.creature, arms.rotations, plan.stride
+    frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
+    found = yield from softening_starts(
+        *(frames, before, going[1], held),
+        rate=plan.job.timing.rate,
+        per_cycle=plan.pace.fastest,
+        every=every,
+        cyclic=cyclic,
+        turning=turning,
+    )
+    if found is None:
+        return
+    softened, moved = found
+    lower, ground = np.zeros(moved.shape, dtype=bool), _underfoot(plan)
+    if ground is not None:
+        course = ArmsOverGround(frames, ground, creature.scale, cyclic=cyclic)
+        radii = [creature.scale * each for each in _radii(plan)]
+        poses = [Poses(each, arms.strains, *going) for each in (before, softened)]
+        share = np.cbrt(moved)
+        softened = yield from keeping_off_ground(course, poses[1], radii, share, closer=MARGIN)
+        poses[1] = replace(poses[1], rotations=softened)
+        room = []
+        for each in poses:
+            room.append(course.room(each, radii))
+            yield
+        lower = room[1] < np.minimum(room[0], 0.0) - TOLERATED
+    arms.rotations = yield from keeping_softer_starts(
+        *(frames, before, softened, going[1]),
+        rate=plan.job.timing.rate,
+        limits=limits,
+        lower=lower,
+        every=every,
+        cyclic=cyclic,
+    )
 
 
 def _trail(plan: MotionPlan, trailing: Trailing, posed: _Posed) -> Steps[None]:

@@ -345,6 +345,17 @@ Hurry slides over bumps by 8 % of an arm of long bones instead of 0.6 %."""
 _RESTING: Final = 0.05
 """Seconds before and after a hold within which an arm comes to stay what it is: at once, arms that
 stand in a pose of the artist's would turn by 83° in a frame as the body leaves them."""
+_JERK: Final = np.radians(15.0) * 24.0
+"""Radians a second that a bone sets out with all at once, when it is …"""
+_ABRUPT: Final = 5.0
+"""… so many times what it turned by in the frame before: who sees it takes it for a jerk …"""
+_QUICKEST: Final = 0.9
+"""… unless a cycle of the gait takes fewer seconds: then whatever moves sets out so."""
+_AT_ONCE: Final = 0.04
+"""Seconds to either side over which a mean is taken of a bone that does."""
+_SOFTENINGS: Final = 5
+"""How often it is at most: with two, nine of the seventeen bones that do in Hurry over bumps, on a
+slope and up stairs do still, with five two."""
 _HELPED: Final = 0.5
 """Share of what a turn is too fast by that must be gone for bones to have been given time."""
 _SAME: Final = 1e-6
@@ -427,6 +438,92 @@ def easing_turns(
     return None if result is rotations else (result, moved)
 
 
+def softening_starts(
+    arms: Sequence[ArmFrames],
+    rotations: Floats,
+    orientations: Floats,
+    held: Sequence[np.ndarray],
+    *,
+    rate: float,
+    per_cycle: float,
+    every: int = 1,
+    cyclic: bool = False,
+    turning: Floats | None = None,
+) -> Generator[None, None, tuple[Floats, Floats] | None]:
+    """Rotations (moments, bones, 4) of arms of which no bone sets out all at once that is free to
+    do otherwise, and how far each arm was moved (moments, arms), 0…1; none where nothing does. In
+    steps.
+
+    Arguments are as of :func:`easing_turns`; a cycle of the gait takes so many frames. Means are
+    narrow: what is shown of a motion long before it is worked out looks but some frames around.
+    """
+    if per_cycle < _QUICKEST * rate:
+        return None
+    result, whole = rotations, np.zeros((len(rotations), len(arms)))
+    for _ in range(_SOFTENINGS):
+        if turning is None:
+            turning = turns_in_world(arms, result, orientations, every)
+            yield
+        starts, turning, before, start = _starts(turning, rate, every), None, result, 0
+        for number, arm in enumerate(arms):
+            own = slice(start, start + len(arm.bones))
+            start, sudden = own.stop, starts[:, own].any(axis=1)
+            if not sudden.any():
+                continue
+            frames = continuous(multiply(orientations[:, None], arm.from_bones(result[:, own])))
+            if cyclic and np.any(np.sum(frames[-1] * frames[0], axis=-1) < 0.0):
+                continue
+            taking_time = _TakingTime(np.zeros(1), every, every * rate, cyclic)
+            frames, share = taking_time.softened(frames, held[number], sudden)
+            some = np.flatnonzero(share.max(axis=1))
+            if not len(some):
+                continue
+            if result is before:
+                result = before.copy()
+            whole[:, number] = np.maximum(whole[:, number], share.min(axis=1))
+            turned = multiply(conjugate(orientations[some, None]), frames[some])
+            result[some, own] = arm.to_bones(turned)
+            yield
+        if result is before:
+            break
+    return None if result is rotations else (result, whole)
+
+
+def keeping_softer_starts(
+    arms: Sequence[ArmFrames],
+    before: Floats,
+    softened: Floats,
+    orientations: Floats,
+    *,
+    rate: float,
+    limits: Floats,
+    lower: np.ndarray,
+    every: int = 1,
+    cyclic: bool = False,
+) -> Generator[None, None, Floats]:
+    """Rotations (moments, bones, 4), softened from what they were before; as before wherever an arm
+    sets out all at once still, turns by more for it than it may, or comes to be ``lower`` (moments,
+    arms) than it ought to. In steps; arguments are as of :func:`easing_turns`.
+    """
+    starts = _starts(turns_in_world(arms, softened, orientations, every), rate, every)
+    yield
+    bad, start = lower.copy(), 0
+    for number, arm in enumerate(arms):
+        own = slice(start, start + len(arm.bones))
+        start = own.stop
+        bad[every:, number] |= starts[:, own].any(axis=1)
+    return (
+        yield from _kept(
+            *(arms, before, softened, orientations),
+            limits=limits,
+            every=every,
+            cyclic=cyclic,
+            spoilt=lambda was, left: left > max(was, 0.0) + _SAME,
+            bad=bad,
+        )
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class _TakingTime:
     """Means over time of frames (moments, bones, 4) of an arm, world, where it is too fast."""
@@ -477,6 +574,15 @@ class _TakingTime:
             frames[some] = multiply(back, mean[some])
             whole = np.maximum(whole, share)
         return frames, whole
+
+    def softened(
+        self, before: Floats, held: np.ndarray, sudden: np.ndarray
+    ) -> tuple[Floats, Floats]:
+        """The same where bones set out all at once (moments − every,): over a frame about it."""
+        width = max(1, round(_AT_ONCE * self.rate))
+        loose = 1.0 - covered(held.astype(np.float64), width, cyclic=self.cyclic)
+        share = self._near(sudden, width)[:, None] * loose
+        return self._mean(before, share, width, fixed=held), share
 
     def _width(self, part: float) -> int:
         return max(1, round(part * _WIDEST * self.rate))
@@ -567,9 +673,11 @@ def _kept(
     every: int,
     cyclic: bool,
     spoilt: Callable[[float, float], bool],
+    bad: np.ndarray | None = None,
 ) -> Generator[None, None, Floats]:
     """Rotations (moments, bones, 4), and as before wherever a stretch of an arm is spoilt: told by
-    what it turned by beyond the limits at most, and what it turns by beyond them now.
+    what it turned by beyond the limits at most, and what it turns by beyond them now; or for
+    moments of it that are bad (moments, arms) anyway.
     """
     then = turns_in_world(arms, before, orientations, every)
     yield
@@ -591,7 +699,10 @@ def _kept(
                 )
                 for each in (then, now)
             )
-            if spoilt(was, left):
+            hopeless = bad is not None and any(
+                bad[first:end, number].any() for first, end in stretch
+            )
+            if hopeless or spoilt(was, left):
                 for first, end in stretch:
                     result[first:end, own] = before[first:end, own]
     return result
@@ -606,6 +717,16 @@ def _turns(frames: Floats, every: int) -> Floats:
     """Radians (moments − every,) that the quickest of the bones turns within a frame."""
     same = np.abs(np.sum(frames[every:] * frames[:-every], axis=-1))
     return 2.0 * np.arccos(np.minimum(same, 1.0)).max(axis=1, initial=0.0)
+
+
+def _starts(turning: Floats, rate: float, every: int) -> np.ndarray:
+    """Where (moments − every, bones) bones that turn so (moments − every, bones), radians within a
+    frame, set out all at once, at so many frames a second.
+    """
+    result = np.zeros(turning.shape, dtype=bool)
+    after = turning[every:]
+    result[every:] = (after > _ABRUPT * turning[:-every]) & (after > _JERK / rate)
+    return result
 
 
 def _rolls(frames: Floats, every: int) -> Floats:
