@@ -692,18 +692,21 @@ are 0.7 to 1 % of an arm in bumps as arms set out for a swim."""
 _ALONG: Final = np.array([1.0, 0.0, 0.0])
 
 
-def afloat(swims: Sequence[bool], shares: Sequence[Floats]) -> Floats:
+def afloat(
+    swims: Sequence[bool], shares: Sequence[Floats], crouched: Floats | float = 0.0
+) -> Floats:
     """How far arms (frames, arms) are to be kept off the ground, 0…1.
 
     Those that walk see to it themselves; all that swim (one segment of the route at least) or go
     over from one gait to another do not. Shares say for each change how far each arm (frames, arms)
-    has gone over.
+    has gone over; however little, it is raised as far as the body has ``crouched`` (frames, 1).
     """
     result = np.full(shares[0].shape if shares else (1, 1), float(swims[0]))
     for swum, share in zip(swims[1:], shares, strict=True):
         leaving = np.maximum(result, _raised(share))
         coming = _raised(1.0 - share) if not swum else 1.0
-        result = np.where(share > 0.0, leaving * coming, result)
+        between = (share > 0.0) & ((share < 1.0) | swum)
+        result = np.where(share > 0.0, np.maximum(leaving * coming, between * crouched), result)
     return result
 
 

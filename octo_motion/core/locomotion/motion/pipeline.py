@@ -612,7 +612,7 @@ def _clearing(
         return arms
     frames = frames_of_arms(creature.skeleton, creature.arms, creature.body)
     course = ArmsOverGround(frames, ground, creature.scale, cyclic=cyclic)
-    loose = plan.segments.afloat(made.travel.distance)
+    loose = plan.segments.afloat(made.travel)
 
     def keeping_off(poses: Poses, share: Floats | None) -> Generator[None, None, Poses]:
         """The same with arms off the ground that know of none, in steps."""

@@ -18,7 +18,7 @@ import numpy as np
 from ...content_cache import ContentCache, content_key
 from ...phrases import phrase
 from ...rotations import Floats, rotate
-from ...smoothing import least_jerk
+from ...smoothing import least_jerk, smooth_step
 from ...steps import evenly
 from ..clearance import afloat
 from ..gait import CYCLE, GaitPoser, GaitTable
@@ -412,6 +412,8 @@ def _too_steep(ground: Ground, path: Floats, reach: float) -> tuple[str, ...]:
 
 _CALM: Final = 0.2
 """Share of a change within which an arm that goes over comes to rest."""
+_CROUCHED: Final = 0.2
+"""Share of a stop within which a body crouches, as far as arms in the air need room for it."""
 _APART: Final = 1_000_000
 """Between the numbers of one gait's cycles and of the next's: each has cycles of its own."""
 _UP: Final = np.array([0.0, 0.0, 1.0])
@@ -541,12 +543,16 @@ class Segments:
             return np.zeros(len(travel.distance))
         return (lines[0].phase(travel.distance) - lines[0].settings.stroke_phase) / CYCLE
 
-    def afloat(self, distance: Floats) -> Floats | None:
+    def afloat(self, travel: Travel) -> Floats | None:
         """How far arms (moments, arms) are to be kept off a ground that their gait knows not."""
+        distance = travel.distance
         swims = [self.walks[self.gait_of(segment)] is None for segment in range(self.count)]
         shares = [self.shares(change, distance) for change in range(len(self.changes))]
         # Of a motion on which the gait never changes, one number stands for all.
-        whole = np.broadcast_to(afloat(swims, shares), (len(distance), len(self.bones)))
+        stop = np.mod(travel.stood, 1.0)[:, None]
+        crouched = smooth_step(np.minimum(stop, 1.0 - stop) / _CROUCHED)
+        whole = afloat(swims, shares, crouched)
+        whole = np.broadcast_to(whole, (len(distance), len(self.bones)))
         return whole if whole.any() else None
 
     def shares(self, change: int, distance: Floats) -> Floats:

@@ -73,3 +73,16 @@ def test_arms_that_walk_see_to_it_themselves() -> None:
     assert both[50] == pytest.approx(1.0)
     for course in (off, on, both):
         assert np.abs(np.diff(course, axis=0)).max() < 0.12
+
+
+def test_an_arm_that_has_let_go_is_raised_as_far_as_its_body_crouches() -> None:
+    share = np.array([0.0, 1e-6, 1e-6, 1e-6, 1.0])[:, None]
+    crouched = np.array([1.0, 0.0, 0.6, 1.0, 0.6])[:, None]
+    leaving = afloat([False, True], [share], crouched)
+    assert leaving[0] == 0.0
+    assert leaving[1] < 0.01
+    np.testing.assert_allclose(leaving[2:, 0], [0.6, 1.0, 1.0])
+    # What holds on already, or still, sees to it itself.
+    coming = afloat([True, False], [1.0 - share], crouched)
+    assert coming[0] == 0.0
+    np.testing.assert_allclose(coming[2:, 0], [0.6, 1.0, 1.0])
