@@ -53,11 +53,14 @@ def test_arms_keep_out_of_each_other_in_a_tight_bend(
 
 def test_without_it_the_body_keeps_its_pace_and_its_arms_tangle() -> None:
     scene = build(
-        "walk", "plane", way=U_TURN, change=lambda settings: setattr(settings, "slow_in_bends", 0.0)
+        "hurry",
+        "plane",
+        way=U_TURN,
+        change=lambda settings: setattr(settings, "slow_in_bends", 0.0),
     )
     assert figures(scene)["OVERLAP"] > 1.0
     assert _slowest(scene) > 0.9
-    assert _slowest(build("walk", "plane", way=U_TURN)) < 0.6
+    assert _slowest(build("hurry", "plane", way=U_TURN)) < 0.6
 
 
 def _slowest(scene: Scene) -> float:
