@@ -55,25 +55,6 @@ def test_arms_that_take_their_time_in_a_hurry_stay_over_the_ground(seed: int) ->
     assert measures.sink(played, surface, length).deepest.value <= 0.009
 
 
-# Arms that lay up a step were in its corner by 0.66, 0.58 and 1.0 % of their length, at frames
-# 115, 91 and 252.
-@pytest.mark.parametrize(
-    ("setup", "seed", "first", "last", "sunk"),
-    [
-        ("walk", 40, 90, 130, 0.005),
-        ("walk", 41, 70, 110, 0.005),
-        ("settle", 41, 225, 265, 0.007),
-    ],
-)
-def test_on_a_way_that_winds_over_stairs_arms_lie_on_the_steps(
-    setup: str, seed: int, first: int, last: int, sunk: float
-) -> None:
-    scene = build(setup, "stairs", way=winding(seed))
-    played = record(scene.armature, moments(first, last, 2))
-    length, surface = measures.arm_length(played, scene.arms), Surface.of(scene.ground)
-    assert measures.sink(played, surface, length).deepest.value <= sunk
-
-
 def test_an_arm_does_not_come_down_on_the_next_but_one() -> None:
     """While the one between them swings; they were 2.3 radii in each other."""
     scene = build("walk", "slope", way=winding(42))

@@ -42,9 +42,9 @@ _ROUGH_STEPS: Final = (2, 1, 1, 2)
 _MORE_STEPS: Final = (2,) * 6
 """The same of arms that are in the ground even so: where they lie up a step, what comes before is
 to fold into its corner. Without, arms of Settle are 0.022 deep there."""
-_DEEP: Final = 0.0015
+_DEEP: Final = 0.0025
 """Arm lengths that joints are in the ground from which on that begins …"""
-_DEEPENING: Final = 0.004
+_DEEPENING: Final = 0.01
 """… within how many more all of it comes …"""
 _IN_A_WALL: Final = 0.03
 """… and from where on, within as many again, it goes: what is as deep is in a wall, out of which
