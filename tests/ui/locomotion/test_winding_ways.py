@@ -71,8 +71,9 @@ def test_an_arm_does_not_come_down_on_the_next_but_one() -> None:
         ("hurry", 9),
         # What could not get to its own side stayed as deep as it was: 0.68 radii.
         ("crawl", None),
-        # Arms came down on their neighbours' feet: 0.77, 0.73, 0.6 and 0.7 radii.
+        # Arms came down on their neighbours' feet: 0.77, 1.2, 0.73, 0.6 and 0.7 radii.
         ("walk", 11),
+        ("walk", 16),
         ("hurry", 11),
         ("tiptoe", 20),
         ("prowl", 20),

@@ -514,15 +514,17 @@ class ArmsOverGround:
 
         Radii are metres from each joint (joints,) of an arm to the skin below it.
         """
-        found = np.full((len(poses.rotations), len(self.arms)), np.inf)
-        for each in (poses, halfway_automatic(poses, cyclic=self.cyclic)):
-            for number, own in enumerate(self.joints(each)):
-                length = self.arms[number].length * self.scale
-                height = own[:, 1:, 2] - self.ground.height(own[:, 1:]) - radii[number][1:]
-                lowest = height.min(axis=1) / length
-                for first in {0, len(found) - len(lowest)}:
-                    part = found[first : first + len(lowest), number]
-                    np.minimum(part, lowest, out=part)
+
+        def lowest(at: Poses) -> Floats:
+            heights = [
+                (own[:, 1:, 2] - self.ground.height(own[:, 1:]) - skin[1:]).min(axis=1)
+                for own, skin in zip(self.joints(at), radii, strict=True)
+            ]
+            return np.stack(heights, axis=1) / [arm.length * self.scale for arm in self.arms]
+
+        found, half = lowest(poses), lowest(halfway_automatic(poses, cyclic=self.cyclic))
+        found[:-1] = np.minimum(found[:-1], half)
+        found[1:] = np.minimum(found[1:], half)
         return found
 
     def dips(self, poses: Poses, clear: Floats, arms: Sequence[int] | None = None) -> Floats:

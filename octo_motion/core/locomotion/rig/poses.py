@@ -359,7 +359,9 @@ slope and up stairs do still, with five two."""
 _HELPED: Final = 0.5
 """Share of what a turn is too fast by that must be gone for bones to have been given time."""
 _SAME: Final = 1e-6
-"""Radians by which a turn may be another and still be the same."""
+"""Radians by which a turn may be another and still be the same …"""
+_UNSEEN: Final = np.radians(0.5)
+"""… and by which it may be more for making way: what nobody sees."""
 
 
 def fastest_turn(rate: float, per_cycle: float) -> float:
@@ -418,10 +420,10 @@ def easing_turns(
         start, most = own.stop, limits[:, number]
         if not (turning[:, own] > most[:, None]).any():
             continue
-        before = continuous(multiply(orientations[:, None], arm.from_bones(rotations[:, own])))
-        if cyclic and np.any(np.sum(before[-1] * before[0], axis=-1) < 0.0):
+        before = _in_world(arm, rotations[:, own], orientations, cyclic=cyclic)
+        if before is None:
             continue
-        taking_time = _TakingTime(most, every, every * rate, cyclic)
+        taking_time = _TakingTime(every, every * rate, cyclic, most)
         # What holds on need not let go of what it has only rolled too fast.
         frames, rolled = taking_time.rolled(before)
         frames, share = taking_time.eased(frames, held[number])
@@ -430,8 +432,7 @@ def easing_turns(
             continue
         if result is rotations:
             result = rotations.copy()
-        turned = multiply(conjugate(orientations[some, None]), frames[some])
-        result[some, own] = arm.to_bones(turned)
+        result[some, own] = _of_bones(arm, frames[some], orientations[some])
         # What holds on is not to be moved for its tip.
         moved[:, number] = share.min(axis=1)
         yield
@@ -459,6 +460,7 @@ def softening_starts(
     """
     if per_cycle < _QUICKEST * rate:
         return None
+    taking_time = _TakingTime(every, every * rate, cyclic)
     result, whole = rotations, np.zeros((len(rotations), len(arms)))
     for _ in range(_SOFTENINGS):
         if turning is None:
@@ -470,10 +472,9 @@ def softening_starts(
             start, sudden = own.stop, starts[:, own].any(axis=1)
             if not sudden.any():
                 continue
-            frames = continuous(multiply(orientations[:, None], arm.from_bones(result[:, own])))
-            if cyclic and np.any(np.sum(frames[-1] * frames[0], axis=-1) < 0.0):
+            frames = _in_world(arm, result[:, own], orientations, cyclic=cyclic)
+            if frames is None:
                 continue
-            taking_time = _TakingTime(np.zeros(1), every, every * rate, cyclic)
             frames, share = taking_time.softened(frames, held[number], sudden)
             some = np.flatnonzero(share.max(axis=1))
             if not len(some):
@@ -481,8 +482,7 @@ def softening_starts(
             if result is before:
                 result = before.copy()
             whole[:, number] = np.maximum(whole[:, number], share.min(axis=1))
-            turned = multiply(conjugate(orientations[some, None]), frames[some])
-            result[some, own] = arm.to_bones(turned)
+            result[some, own] = _of_bones(arm, frames[some], orientations[some])
             yield
         if result is before:
             break
@@ -524,18 +524,34 @@ def keeping_softer_starts(
     )
 
 
+def _in_world(
+    arm: ArmFrames, rotations: Floats, orientations: Floats, *, cyclic: bool
+) -> Floats | None:
+    """Frames (moments, bones, 4) of an arm in the world, from its bones' rotations, each near to
+    the one before; none where that is not so from the last of a loop to the first.
+    """
+    frames = continuous(multiply(orientations[:, None], arm.from_bones(rotations)))
+    torn = cyclic and np.any(np.sum(frames[-1] * frames[0], axis=-1) < 0.0)
+    return None if torn else frames
+
+
+def _of_bones(arm: ArmFrames, frames: Floats, orientations: Floats) -> Floats:
+    """Its bones' rotations (moments, bones, 4) from its frames in the world."""
+    return arm.to_bones(multiply(conjugate(orientations[:, None]), frames))
+
+
 @dataclass(frozen=True, eq=False)
 class _TakingTime:
     """Means over time of frames (moments, bones, 4) of an arm, world, where it is too fast."""
 
-    most: Floats
-    """(moments − every,) radians that bones may turn within a frame."""
     every: int
     """At every how many moments there is a frame."""
     rate: float
     """Moments a second."""
     cyclic: bool
     """Whether the last moment is the first again."""
+    most: Floats | float = np.inf
+    """(moments − every,) radians that bones may turn within a frame."""
 
     def eased(self, before: Floats, held: np.ndarray) -> tuple[Floats, Floats]:
         """The frames, and how far means count in them (moments, bones or 1): not while they are
@@ -658,7 +674,7 @@ def keeping_where_calm(
             limits=limits,
             every=every,
             cyclic=cyclic,
-            spoilt=lambda was, left: left > max(was, 0.0) + _SAME,
+            spoilt=lambda was, left: left > max(was, 0.0) + _UNSEEN,
         )
     )
 
