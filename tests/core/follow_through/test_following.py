@@ -343,6 +343,33 @@ def test_motion_elsewhere_in_the_world_is_the_same(usual: Done) -> None:
     assert angle_between(found.turns, done(moved(job, by)).turns)[:, 1:].max() < 1e-9
 
 
+def jerking(times: Floats) -> tuple[Floats, Floats]:
+    """Turns somewhere else at each of 24 frames a second."""
+    chance = np.random.default_rng(11)
+    turns = chance.uniform(-0.6, 0.6, size=(200, 3))
+    frames = np.arange(200) / 24.0
+    return (
+        np.zeros((len(times), 3)),
+        np.stack([np.interp(times, frames, each) for each in turns.T], axis=1),
+    )
+
+
+@pytest.mark.parametrize("material", ["WIRE", "CLAY", "DOLL", "LIMP"])
+@pytest.mark.parametrize("about", [0.7, 3.0])
+def test_what_gives_way_does_so_wherever_the_creature_is_turned_to(
+    material: str, about: float
+) -> None:
+    """Over a floor, with all of its weight, jerked about."""
+    settings = FollowSettings(material=material, gravity=1.0)
+    floor = Plane(position=np.array([0.0, 0.0, -0.15]))
+    job = tail_job(jerking, settings, count=8, seconds=1.5, obstacles=(floor,))
+    by = Displacement(from_rotation_vector(np.array([0.0, 0.0, about])), np.array([3.0, -2.0, 0.0]))
+    found, elsewhere = done(job), done(moved(job, by))
+    assert lag(job, found).max() > 0.2
+    off = angle_between(found.turns, elsewhere.turns)
+    assert off.max() < 1e-3
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [

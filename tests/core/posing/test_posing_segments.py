@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from octo_motion.core.posing.puppet import Figure, elements_for
+from octo_motion.core.posing.puppet import Figure, elements_for, joined
 from octo_motion.core.posing.solver import Plane, World, WorldSettings
 from octo_motion.core.posing.solver.cuts import Cuts
 from octo_motion.core.posing.solver.segments import SegmentedTree, cut_at, tree_of
@@ -36,7 +36,18 @@ def two_chains() -> Figure:
     return puppet(parents, anchors, [0.1] * 60, [0.02] * 60)
 
 
-FIGURES = {"chain": chain(100), "comb": comb(), "two chains": two_chains(), "doll": doll()}
+def hair(strands: int = 12, length: int = 10) -> Figure:
+    """Strands with a root each, so that no cut of one sees a cut of another."""
+    return joined([chain(length, 0.1, 0.02)] * strands)
+
+
+FIGURES = {
+    "chain": chain(100),
+    "comb": comb(),
+    "two chains": two_chains(),
+    "doll": doll(),
+    "hair": hair(),
+}
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -105,6 +116,28 @@ def test_a_long_chain_moves_as_one_system_has_it() -> None:
         ends.append(np.concatenate([world.pose().positions, world.velocities()[:, :3]], axis=1))
     assert np.abs(ends[0][:, :3] - ends[0][0, :3]).max() > 0.1
     # Rounding, and what a pose makes of it in 60 steps.
+    assert np.abs(ends[1] - ends[0]).max() < 1e-9
+
+
+@pytest.mark.parametrize("length", [6, 7, 10, 16, 30])
+def test_a_head_full_of_strands_is_solved(length: int) -> None:
+    """Each cut once, or not at all: all cuts go in one round, and none is left."""
+    figure = hair(30, length)
+    tree = tree_of(figure)
+    assert tree.cost > 0.0
+    ends: list[Floats] = []
+    for each in (tree, Tree(figure)):
+        world = World(figure, posed(figure), WorldSettings(gravity=(0.0, 0.0, -9.81)))
+        world._tree = world._bodies._tree = world._warm._tree = each
+        world._warm.forget()
+        world._use(world.settings)
+        for body in range(0, len(figure), length):
+            world.pin(body)
+        start = world.pose().positions
+        for _ in range(20):
+            world.step()
+        ends.append(world.pose().positions)
+        assert np.abs(ends[-1] - start).max() > 1e-4
     assert np.abs(ends[1] - ends[0]).max() < 1e-9
 
 

@@ -175,7 +175,7 @@ def _round(count: int, pairs: Pairs, gone: list[int]) -> tuple[_Round, Pairs]:
     old = [pairs.get((kept[a], kept[b]), empty) for a, b in taken]
     plan = _Round(
         np.array(gone),
-        np.array(kept),
+        np.array(kept, dtype=np.int64),
         np.array([pairs[cut, cut] for cut in gone]),
         np.array(blocks),
         np.array(neighbours),
@@ -188,6 +188,6 @@ def _round(count: int, pairs: Pairs, gone: list[int]) -> tuple[_Round, Pairs]:
 
 def _layers(lists: list[list[int]], empty: int) -> tuple[Integers, ...]:
     """The first of each list, the second of each, and so on; ``empty`` where there is none."""
-    most = max(map(len, lists))
+    most = max(map(len, lists), default=0)
     filled = [each + [empty] * (most - len(each)) for each in lists]
     return tuple(np.array(filled, dtype=np.int64).reshape(len(lists), most).T.copy())
