@@ -429,6 +429,50 @@ def over_a_motion(hand: Hand, figures: Figures) -> Steps:
     yield from hand.take("over_a_motion_2_layer")
 
 
+def controls(hand: Hand, figures: Figures) -> Steps:
+    """A foot that an empty leads is pulled: the empties get the keys, and play what was seen."""
+    new_file(hand)
+    yield 1.0
+    yield from hand.show_tab()
+    somebody, empties = led_by_empties()
+    yield from hand.settled()
+    yield from _begin_session(hand)
+    begun = joints(somebody)
+    places = [tuple(each.location) for each in empties]
+    start = hand.pixel(somebody.matrix_world @ somebody.pose.bones["LeftFoot"].head)
+    yield from hand.move(*start)
+    hand.event("LEFTMOUSE", "PRESS")
+    yield PAUSE
+    for number in range(25):
+        yield from hand.move(start[0] + 4 * number, start[1] + 3 * number)
+    yield from hand.take("controls_1_pulled")
+    hand.event("LEFTMOUSE", "RELEASE")
+    yield 0.5
+    shown = joints(somebody)
+    yield from hand.key("K")
+    yield 0.5
+    keyed = {each.name: len(curves(action_of(each))) for each in empties}
+    figures["keyed"] = ", ".join(name for name, count in keyed.items() if count)
+    check(keyed["Left Goal"], f"The goal has no key: {keyed}")
+    check(not keyed["Right Goal"], f"The other foot's goal has one: {keyed}")
+    yield from hand.take("controls_2_keyed")
+    yield from hand.key("RET")
+    yield 1.0
+    check(not _modal("OCTO_MOTION_OT_pose"), "Enter has not ended the session.")
+    for each, place in zip(empties, places, strict=True):
+        each.location = place
+    scene: Any = bpy.context.scene
+    scene.frame_set(2)
+    scene.frame_set(1)
+    now = joints(somebody)
+    foot = somebody.pose.bones.find("LeftFoot")
+    figures["pulled, m"] = round(_apart(shown[foot], begun[foot]), 3)
+    figures["off, mm"] = round(1e3 * _farthest(now, shown), 2)
+    check(figures["pulled, m"] > 0.1, "The foot has hardly moved.")
+    check(figures["off, mm"] < 1.0, "The keys play something else than was seen.")
+    yield from hand.take("controls_3_played")
+
+
 def language(hand: Hand, figures: Figures) -> Steps:
     """Blender speaks Japanese, and then again what it spoke; the panel follows at once."""
     new_file(hand)
@@ -485,6 +529,7 @@ STEPS: Final[dict[str, Callable[[Hand, Figures], Steps]]] = {
     "pose": pose,
     "undisturbed": undisturbed,
     "over_a_motion": over_a_motion,
+    "controls": controls,
     "language": language,
     "switched_off": switched_off,
 }
@@ -619,6 +664,28 @@ def person(name: str, aside: float, *, wave: bool) -> Any:
     bpy.ops.object.mode_set(mode="OBJECT")
     armature.animation_data.action.name = f"{name} Clip"
     return armature
+
+
+def led_by_empties() -> tuple[Any, list[Any]]:
+    """Somebody whose legs reach for empties and bend towards others; and these."""
+    somebody = person("Led", 0.0, wave=False)
+    somebody.animation_data_clear()
+    bones, empties = somebody.pose.bones, list[Any]()
+    for bone in bones:
+        bone.rotation_euler = (0.0, 0.0, 0.0)
+    for side in ("Left", "Right"):
+        constraint: Any = bones[f"{side}Leg"].constraints.new("IK")
+        places = {"Goal": bones[f"{side}Leg"].tail, "Pole": bones[f"{side}Leg"].head}
+        for kind, place in places.items():
+            empty: Any = bpy.data.objects.new(f"{side} {kind}", None)
+            bpy.context.scene.collection.objects.link(empty)
+            empty.location, empty.empty_display_size = place, 0.05
+            empties.append(empty)
+        empties[-1].location.y -= 0.8
+        constraint.target, constraint.pole_target = empties[-2:]
+        constraint.chain_count, constraint.pole_angle = 2, -0.5 * pi
+    select(somebody)
+    return somebody, empties
 
 
 def main(folder: Path, language: str, names: list[str]) -> None:

@@ -84,7 +84,7 @@ def _active(collection: Any, index: int, what: str) -> Any:
     if not 0 <= index < len(collection):
         raise GaitError(
             phrase("No {what} is chosen.", what=what),
-            phrase("Choose one, or add a {what}.", what=what),
+            phrase("Choose one, or add one."),
         )
     return collection[index]
 
