@@ -157,6 +157,30 @@ def test_loop_that_travels_and_turns_closes_too() -> None:
     assert np.array_equal(found.turns[0], found.turns[-1])
 
 
+@pytest.mark.parametrize("medium", ["AIR", "WATER"])
+def test_loop_of_clay_that_sags_closes_unseen(medium: str) -> None:
+    """It creeps on for ever, but by less and less: half a degree over a second is none."""
+    settings = FollowSettings(material="CLAY", gravity=1.0, medium=medium)
+    job = tail_job(wagging, settings, seconds=1.0)
+    found = done(replace(job, cycle=displacement(job.motion, 0)))
+    assert found.repeats
+    assert found.rounds < 30
+    assert np.array_equal(found.turns[0], found.turns[-1])
+    speed = to_rotation_vector(multiply(found.turns[1:], conjugate(found.turns[:-1])))
+    change = np.linalg.norm(np.diff(speed, axis=0), axis=-1).max(axis=0)
+    seam = np.linalg.norm(speed[0] - speed[-1], axis=-1)
+    assert (seam < 1.2 * change).all()
+
+
+def test_loop_that_will_not_repeat_is_told_and_not_run_for_ever() -> None:
+    """Without weight and springs a tail goes where it will."""
+    job = tail_job(wagging, FollowSettings(material="LIMP", gravity=0.0), seconds=1.0)
+    found = done(replace(job, cycle=displacement(job.motion, 0)))
+    assert not found.repeats
+    assert found.rounds < 50
+    assert np.array_equal(found.turns[0], found.turns[-1])
+
+
 def turning_by(angle: Callable[[Floats], Floats]) -> Callable[[Floats], tuple[Floats, Floats]]:
     """Turns about Z by an angle of the time."""
 
