@@ -242,6 +242,13 @@ def test_hand_never_gets_more_than_it_gave_whatever_the_coupling_asks_for(
     assert observer.given <= 1e-9
 
 
+@pytest.mark.parametrize("speed", [1e-300, 1e-162, 2e-162, 1e-160, 1e-12])
+def test_loop_goes_on_with_a_hand_that_hardly_moves(speed: float) -> None:
+    observer = Observer(STORED, 5.0)
+    damping = observer.damping((8.0, 0.0, 0.0), (speed, 0.0, 0.0), PERIOD)
+    assert 0.0 <= -damping[0] <= 5.0 * speed
+
+
 @given(st.lists(st.tuples(forces, ways), max_size=40))
 def test_what_can_come_back_is_never_more_than_the_store_holds(
     steps: list[tuple[Vector, Vector]],

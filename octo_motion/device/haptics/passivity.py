@@ -78,13 +78,14 @@ class Observer:
 
         The hand's velocity is expected to go on for the coming period (s).
         """
-        speed_squared = dot(velocity, velocity)
-        if speed_squared <= 0.0:
+        # Of what hardly moves the square, and what comes of it in a period, may be none.
+        spent = dot(velocity, velocity) * period
+        if spent <= 0.0:
             return ZERO
         left = self.energy - dot(force, velocity) * period
         if left >= 0.0:
             return ZERO
-        amount = min(self.most_damping, -left / (speed_squared * period))
+        amount = min(self.most_damping, -left / spent)
         return scale(velocity, -amount)
 
     def allowed(self, force: Vector, velocity: Vector, period: float) -> Vector:

@@ -67,9 +67,13 @@ class AnatomicalFrame:
 
     def beginning_at(self, joint: int, skeleton: Skeleton) -> AnatomicalFrame:
         """The same one with its origin where a joint is at rest."""
+        return self.midway((joint,), skeleton)
+
+    def midway(self, joints: Sequence[int], skeleton: Skeleton) -> AnatomicalFrame:
+        """The same one with its origin midway between joints at rest."""
         back = conjugate(skeleton.rest_rotations[self.bone])
-        place = rotate(back, skeleton.heads[joint] - skeleton.heads[self.bone])
-        return replace(self, origin=place)
+        middle = skeleton.heads[list(joints)].mean(axis=0)
+        return replace(self, origin=rotate(back, middle - skeleton.heads[self.bone]))
 
     def at_rest(self, skeleton: Skeleton) -> Floats:
         """Orientation (4,) in the rest pose, armature space."""

@@ -71,6 +71,11 @@ class LegTravel:
         self._other_ground = ground_height(retarget.splice)
         ours, theirs = retarget.base, retarget.splice
         check_hips(ours.skeleton, retarget.frames[0].bone)
+        self._frames = tuple(
+            frame.midway([mapped.bone(f"thigh.{side}") for side in "LR"], mapped.skeleton)
+            for frame, mapped in zip(retarget.frames, (ours, theirs), strict=True)
+        )
+        """Of the pelvis, between its hip joints: legs may be seen from one of these."""
         self._ratio = leg_length(ours) * ours.clip.scale / (leg_length(theirs) * theirs.clip.scale)
         self._bodies = bodies_of(ours, theirs)
 
@@ -86,7 +91,7 @@ class LegTravel:
             rotations: (frames, bones, 4) of them, to be changed.
             locations: (frames, bones, 3), likewise.
         """
-        ours = self._retarget.frames[0]
+        ours = self._frames[0]
         own = body_path(clip, ours, base, clip.frames)
         path = self._way(span)
         first = span.frames.start
@@ -154,7 +159,7 @@ class LegTravel:
 
     def _way(self, span: SpliceWindow) -> BodyPath:
         """The splice's pelvis through the world, round after round where it loops."""
-        clip, frame = self._retarget.splice.clip, self._retarget.frames[1]
+        clip, frame = self._retarget.splice.clip, self._frames[1]
         path = body_path(clip, frame, sample_clip(clip, span.splice_frames), span.splice_frames)
         if not (span.rounds.any() or span.seams.any()):
             return path
