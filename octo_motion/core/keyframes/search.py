@@ -40,6 +40,8 @@ _MENDING: Final = 40
 """Rounds in which keys are added; then they get the values of the motion itself …"""
 _PINNING: Final = 40
 """… in so many more at most."""
+_LAST: Final = 4
+"""Rounds in which all tracks get them."""
 _TIDYING: Final = 0.95
 """Share of the work that is done then."""
 
@@ -117,6 +119,8 @@ class Search:
                 limit = max(1.0 + _FALLS * (limit - 1.0), _KEPT) if limit > 1.03 else _KEPT
                 yield done
             yield from evenly(self._fit(_STEPS), done)
+        else:
+            self._pin_all()
         yield _TIDYING
         yield from evenly(self._tidying(), _TIDYING)
         yield 1.0
@@ -234,6 +238,18 @@ class Search:
         self._keyed[self._columns[tracks[split]], at[split]] = True
         stuck = ~(loosened | split)
         self._pin(tracks[stuck], frames[stuck])
+
+    def _pin_all(self) -> None:
+        """Give all tracks the motion's own values about all moments that are off: what is left to
+        do where the one that has most to do with it cannot make up for the others.
+        """
+        for _ in range(_LAST):
+            own, joint = self._measured()
+            off = np.flatnonzero(np.maximum(own.max(axis=0), joint) > _KEPT)
+            if not len(off):
+                return
+            tracks = np.arange(len(own))
+            self._pin(np.repeat(tracks, len(off)), np.tile(off, len(tracks)))
 
     def _culprits(self, own: Floats, frames: Integers) -> Integers:
         """The track (frames,) that has most to do with the limb's being off at some frames."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from octo_motion.core.errors import SettingsError
@@ -113,6 +113,8 @@ def test_every_bone_is_within_the_angle_at_every_frame(
 
 @settings(max_examples=30)
 @given(seeds, st.floats(1e-4, 0.05))
+# Of which one bone cannot make up for the others.
+@example(seed=2460, distance=1e-4)
 def test_the_tip_is_within_the_distance_at_every_frame(seed: int, distance: float) -> None:
     random = np.random.default_rng(seed)
     skeleton, bones, chain = an_arm(random)
