@@ -22,7 +22,7 @@ from ...rotations import (
     shortest_arc,
 )
 from ...skeleton import Skeleton
-from ...smoothing import blurred, covered, spans
+from ...smoothing import blurred, covered, smooth_step, spans
 from .arm_chains import BodyFrame, joint_positions
 from .bone_rotations import ArmFrames, along_segments, arm_rest, rotate_bones, turns_in_world
 
@@ -353,6 +353,13 @@ _QUICKEST: Final = 0.9
 """… unless a cycle of the gait takes fewer seconds: then whatever moves sets out so."""
 _AT_ONCE: Final = 0.04
 """Seconds to either side over which a mean is taken of a bone that does."""
+_LATE: Final = 0.5 / 24.0
+"""Seconds by which what was held until then sets out later at most …"""
+_STAYS_LATE: Final = 4.0 / 24.0
+"""… for so long …"""
+_IN_TIME: Final = 8.0 / 24.0
+"""… and seconds after which it is in time again. By means alone, which move nothing that is held,
+57 bones still set out so on eight ways of Hurry, with this two."""
 _SOFTENINGS: Final = 5
 """How often it is at most: with two, nine of the seventeen bones that do in Hurry over bumps, on a
 slope and up stairs do still, with five two."""
@@ -594,11 +601,45 @@ class _TakingTime:
     def softened(
         self, before: Floats, held: np.ndarray, sudden: np.ndarray
     ) -> tuple[Floats, Floats]:
-        """The same where bones set out all at once (moments − every,): over a frame about it."""
+        """The same where bones set out all at once (moments − every,): later by a moment those of
+        an arm that has just let go, for nothing before that may move; else by means over a frame
+        about it.
+        """
+        frames, late, left = self._later(before, held, sudden)
         width = max(1, round(_AT_ONCE * self.rate))
         loose = 1.0 - covered(held.astype(np.float64), width, cyclic=self.cyclic)
-        share = self._near(sudden, width)[:, None] * loose
-        return self._mean(before, share, width, fixed=held), share
+        share = self._near(left, width)[:, None] * loose
+        if share.any():
+            frames = self._mean(frames, share, width, fixed=held)
+        return frames, np.maximum(share, late)
+
+    def _later(
+        self, before: Floats, held: np.ndarray, sudden: np.ndarray
+    ) -> tuple[Floats, Floats, np.ndarray]:
+        """Frames in which what lets go is late at first and in time again before it is to hold on
+        anew, where that was (moments, bones or 1), and what is left that sets out all at once.
+        """
+        frames, late, left = before.copy(), np.zeros(held.shape), sudden.copy()
+        holds, last = held.any(axis=1), len(before) - 1 - int(self.cyclic)
+        for number in np.flatnonzero(sudden).tolist():
+            if not holds[max(number - 2 * self.every, 0) : number + self.every].any():
+                continue
+            again = np.flatnonzero(holds[number + self.every :])
+            seconds = min(_IN_TIME, (again[0] if len(again) else len(before)) / self.rate)
+            if seconds < _STAYS_LATE + 4.0 * _LATE:
+                continue
+            left[number] = False
+            after = np.arange(number + 1, min(number + round(seconds * self.rate), last) + 1)
+            since = (after - number) / self.rate
+            fading = smooth_step((since - _STAYS_LATE) / (seconds - _STAYS_LATE))
+            place = after - self.rate * np.minimum(0.5 * since, _LATE) * (1.0 - fading)
+            low = np.minimum(place.astype(np.intp), len(before) - 2)
+            share = (place - low)[:, None, None]
+            there = normalized(frames[low] + share * (frames[low + 1] - frames[low]))
+            free = ~held[after]
+            frames[after] = np.where(free[..., None], there, frames[after])
+            late[after] = np.maximum(late[after], free)
+        return frames, late, left
 
     def _width(self, part: float) -> int:
         return max(1, round(part * _WIDEST * self.rate))

@@ -14,7 +14,7 @@ from octo_motion.core.locomotion.rig.poses import (
     softening_starts,
     turn_limits,
 )
-from octo_motion.core.rotations import Floats
+from octo_motion.core.rotations import Floats, from_axis_angle
 from octo_motion.core.steps import finished
 from tests.core.locomotion.rig.test_turn_easing import FRAMES, SLOWLY, STILL, arms_of, flipping
 
@@ -62,6 +62,46 @@ def test_a_bone_that_sets_out_all_at_once_begins_gently(rate: float) -> None:
     np.testing.assert_array_equal(found[0][:, bones:], rotations[:, bones:])
     assert not found[1][same].any()
     assert not found[1][:, 1:].any()
+
+
+def letting_go(rate: float, again: int = FRAMES) -> tuple[list[ArmFrames], Floats, np.ndarray]:
+    """A bone that is held until a frame, and then turns by 150° in a third of a second, hardly
+    before it is quick; and where (frames, 1) it is held, from some frame on again.
+    """
+    arms = arms_of()
+    bones = len(arms[0].bones)
+    rotations = flipping(0.0, AT, len(arms), bones, 3)
+    share = np.clip((np.arange(FRAMES) - AT) / rate * 3.0, 0.0, 1.0)
+    angle = np.radians(150.0) * np.sin(0.5 * np.pi * share) ** 1.2
+    axis = np.tile([1.0, 0.0, 0.0], (FRAMES, 1))
+    rotations[:, 3] = from_axis_angle(axis, angle)
+    held = np.ones((FRAMES, 1), dtype=bool)
+    held[AT + 1 : again] = False
+    return arms, rotations, held
+
+
+@pytest.mark.parametrize("rate", [24.0, 48.0])
+def test_an_arm_that_lets_go_sets_out_gently_and_is_in_time_for_its_next_hold(rate: float) -> None:
+    arms, rotations, held = letting_go(rate)
+    assert starts(arms, rotations, rate)
+    around = [held, *([np.ones_like(held)] * (len(arms) - 1))]
+    steps = softening_starts(arms, rotations, STILL, around, rate=rate, per_cycle=SLOWLY)
+    found = finished(steps)
+    assert found is not None
+    assert not starts(arms, found[0], rate)
+    # What holds on stays, and a third of a second later all is as it was.
+    same = np.r_[: AT + 1, AT + round(0.4 * rate) : FRAMES]
+    np.testing.assert_allclose(found[0][same], rotations[same], atol=1e-12)
+    turns = turns_in_world(arms, found[0], STILL, 1)
+    assert turns.max() <= 1.05 * turns_in_world(arms, rotations, STILL, 1).max()
+
+
+def test_an_arm_that_holds_on_again_at_once_is_not_late() -> None:
+    arms, rotations, held = letting_go(24.0, again=AT + 4)
+    around = [held, *([np.ones_like(held)] * (len(arms) - 1))]
+    found = finished(softening_starts(arms, rotations, STILL, around, rate=24.0, per_cycle=SLOWLY))
+    if found is not None:
+        np.testing.assert_array_equal(found[0][AT + 4 :], rotations[AT + 4 :])
 
 
 def test_what_sets_out_slowly_or_holds_on_or_goes_in_a_hurry_is_left_alone() -> None:
