@@ -302,16 +302,7 @@ def pose(hand: Hand, figures: Figures) -> Steps:
     yield from hand.search("Pose by Hand")
     yield 2.0
     check(_modal("OCTO_MOTION_OT_pose"), "The session has not begun.")
-    tip = creature.pose.bones["arm2.08.L"]
-    start = hand.pixel(creature.matrix_world @ tip.head)
-    yield from hand.move(*start)
-    hand.event("LEFTMOUSE", "PRESS")
-    yield PAUSE
-    for number in range(25):
-        yield from hand.move(start[0] + 2 * number, start[1] + 6 * number)
-    yield from hand.take("pose_1_pulled")
-    hand.event("LEFTMOUSE", "RELEASE")
-    yield 0.3
+    yield from _pull(hand, creature, "arm2.08.L", still=0.0, picture="pose_1_pulled")
     yield from hand.key("P")
     yield from hand.key("K")
     yield 0.5
@@ -439,15 +430,7 @@ def controls(hand: Hand, figures: Figures) -> Steps:
     yield from _begin_session(hand)
     begun = joints(somebody)
     places = [tuple(each.location) for each in empties]
-    start = hand.pixel(somebody.matrix_world @ somebody.pose.bones["LeftFoot"].head)
-    yield from hand.move(*start)
-    hand.event("LEFTMOUSE", "PRESS")
-    yield PAUSE
-    for number in range(25):
-        yield from hand.move(start[0] + 4 * number, start[1] + 3 * number)
-    yield from hand.take("controls_1_pulled")
-    hand.event("LEFTMOUSE", "RELEASE")
-    yield 0.5
+    yield from _pull(hand, somebody, "LeftFoot", still=0.2, way=(4, 3), picture="controls_1_pulled")
     shown = joints(somebody)
     yield from hand.key("K")
     yield 0.5
@@ -576,15 +559,27 @@ def _begin_session(hand: Hand) -> Steps:
     check(_modal("OCTO_MOTION_OT_pose"), "The session has not begun.")
 
 
-def _pull(hand: Hand, creature: Any, bone: str, still: float) -> Steps:
-    """Drag a bone up and aside, and hold it still for some seconds before letting go."""
+def _pull(
+    hand: Hand,
+    creature: Any,
+    bone: str,
+    *,
+    still: float,
+    way: tuple[float, float] = (2.0, 6.0),
+    picture: str = "",
+) -> Steps:
+    """Drag a bone by 25 times so many pixels, and hold it still for some seconds, in which a
+    picture may be taken, before letting go.
+    """
     start = hand.pixel(creature.matrix_world @ creature.pose.bones[bone].head)
     yield from hand.move(*start)
     hand.event("LEFTMOUSE", "PRESS")
     yield PAUSE
     for number in range(25):
-        yield from hand.move(start[0] + 2 * number, start[1] + 6 * number)
+        yield from hand.move(start[0] + way[0] * number, start[1] + way[1] * number)
     yield still
+    if picture:
+        yield from hand.take(picture)
     hand.event("LEFTMOUSE", "RELEASE")
     yield 0.3
 
