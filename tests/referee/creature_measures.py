@@ -27,6 +27,8 @@ CREEPING = 0.1
 """Arm lengths a second: in place, what is slower rests."""
 VISIBLE = 0.005
 """Arm lengths: what is deeper in the ground is seen to be."""
+_JUMP: Final = 6.0
+"""Degrees."""
 SUDDEN = 5.0
 """Times the turn of the frame before …"""
 MUCH = 15.0
@@ -83,6 +85,15 @@ def sudden_starts(recording: Recording) -> int:
     """How often a bone goes off all at once: the jerk of a marionette whose string was plucked."""
     values = angles_between(recording.turns[1:], recording.turns[:-1])
     return int(np.sum((values[1:] > SUDDEN * values[:-1]) & (values[1:] > MUCH)))
+
+
+def jumps(recording: Recording) -> int:
+    """How often a bone turns by more than 6° in a single frame amid others in which it does not
+    turn by a quarter of that: it trembles between two poses.
+    """
+    values = angles_between(recording.turns[1:], recording.turns[:-1])
+    beside = np.maximum(np.maximum(values[:-2], values[2:]), 1.0)
+    return int(np.sum((values[1:-1] > _JUMP) & (values[1:-1] > 4.0 * beside)))
 
 
 def pop(largest: Sequence[float]) -> float:

@@ -451,6 +451,9 @@ def _brought_out(
     deep = _deepest(batch, own, strain, stance, ground)
     share = smooth_step((deep - _DEEP) / _DEEPENING)
     share *= 1.0 - smooth_step((deep - _IN_A_WALL) / _IN_A_WALL)
+    # Where a body rests, or on level ground, what comes later brings them out, and this is help
+    # at one frame and none at the next: arms of an artist's rig in Idle trembled by 10°.
+    share *= _dragged(batch, stance)
     chosen = np.flatnonzero(share > 0.0)
     if len(chosen) == 0:
         return own
@@ -503,10 +506,16 @@ def _laid_on_ground(
 def _dragged_up(batch: Batch, stance: Stance) -> Floats:
     """Metres (segments + 1, batch) that joints rise which the body drags on, beyond what lies."""
     whole, beyond = batch.reach[-1], stance.contact_from - batch.reach
+    along = smooth_step(beyond / (_DRAGGED_ALONG * whole))
+    return _DRAGGED_UP * whole * _dragged(batch, stance) * along
+
+
+def _dragged(batch: Batch, stance: Stance) -> Floats:
+    """How far (batch,), 0…1, a body drags its arms over uneven ground while they hold on."""
     upward = components_first.normalized(np.sum(stance.normals, axis=0))
     uneven = np.arccos(np.clip(dot(stance.normals, upward).min(axis=0), -1.0, 1.0))
-    dragged = smooth_step(stance.goes / (_DRAGGED_BY * whole)) * smooth_step(uneven / _DRAGGED_OVER)
-    return _DRAGGED_UP * whole * dragged * smooth_step(beyond / (_DRAGGED_ALONG * whole))
+    goes = smooth_step(stance.goes / (_DRAGGED_BY * batch.reach[-1]))
+    return goes * smooth_step(uneven / _DRAGGED_OVER)
 
 
 def _to_goal(batch: Batch, stance: Stance) -> Floats:
