@@ -27,7 +27,7 @@ CREEPING = 0.1
 """Arm lengths a second: in place, what is slower rests."""
 VISIBLE = 0.005
 """Arm lengths: what is deeper in the ground is seen to be."""
-_JUMP: Final = 6.0
+_JUMP = 6.0
 """Degrees."""
 SUDDEN = 5.0
 """Times the turn of the frame before …"""
