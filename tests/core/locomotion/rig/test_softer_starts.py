@@ -100,8 +100,7 @@ def test_an_arm_that_holds_on_again_at_once_is_not_late() -> None:
     arms, rotations, held = letting_go(24.0, again=AT + 4)
     around = [held, *([np.ones_like(held)] * (len(arms) - 1))]
     found = finished(softening_starts(arms, rotations, STILL, around, rate=24.0, per_cycle=SLOWLY))
-    if found is not None:
-        np.testing.assert_array_equal(found[0][AT + 4 :], rotations[AT + 4 :])
+    assert found is None
 
 
 def test_what_sets_out_slowly_or_holds_on_or_goes_in_a_hurry_is_left_alone() -> None:
