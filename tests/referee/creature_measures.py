@@ -25,6 +25,8 @@ CARRIED = 0.5
 """Share of the body's speed: what is faster is taken along, not resting."""
 CREEPING = 0.1
 """Arm lengths a second: in place, what is slower rests."""
+STILL = 0.0072
+"""Arm lengths a second: ends of a bone that go slower hold still."""
 VISIBLE = 0.005
 """Arm lengths: what is deeper in the ground is seen to be."""
 _JUMP = 6.0
@@ -170,6 +172,35 @@ def resting(
                 frame = recording.frames[inside][int(np.argmax(away))]
                 drift = Worst(float(away.max()), float(frame), name)
     return Resting(slip, drift, counted / rests.size)
+
+
+def rolling(
+    recording: Recording, arms: Sequence[Sequence[str]], length: float
+) -> tuple[Worst, float]:
+    """By how much bones turn, in degrees, while both of their ends keep still: suckers that slide
+    sideways under an arm which holds on. The worst hold, and the mean of all.
+
+    Args:
+        recording: one moment a frame.
+        arms: bones from root to tip.
+        length: of an arm, metres.
+    """
+    still = STILL * length / recording.fps
+    worst, found = Worst(0.0, recording.frames[0]), [0.0]
+    for row in np.concatenate([recording.chain(arm) for arm in arms]):
+        ends = np.stack([recording.heads[:, row], recording.tails[:, row]])
+        steps = np.linalg.norm(np.diff(ends, axis=1), axis=-1).max(axis=0)
+        for first, last in _runs(steps < still):
+            if last - first < LONG * recording.fps:
+                continue
+            turns = recording.turns[first : last + 1, row]
+            middle = np.broadcast_to(turns[len(turns) // 2], turns.shape)
+            away = angles_between(turns, middle)
+            found.append(float(away.max()))
+            if away.max() > worst.value:
+                frame = recording.frames[first + int(np.argmax(away))]
+                worst = Worst(float(away.max()), float(frame), recording.names[row])
+    return worst, float(np.mean(found))
 
 
 def _root(recording: Recording) -> int:

@@ -152,6 +152,16 @@ def test_a_bone_that_turns_is_told_with_its_frame() -> None:
     assert worst.value == pytest.approx(27.0)
 
 
+def test_a_bone_that_rolls_while_its_ends_keep_still_is_told_and_one_that_swings_is_not() -> None:
+    rolls = np.where(np.arange(48) >= 30, 40.0, 0.0)
+    worst, mean = measures.rolling(lying(np.zeros((48, 3)), turned(rolls)), [ARM], LENGTH)
+    assert (worst.name, worst.frame) == ("d", 30.0)
+    assert worst.value == pytest.approx(40.0)
+    assert 5.0 < mean < 40.0
+    swings = np.arange(48)[:, None] * [0.001, 0.0, 0.0]
+    assert measures.rolling(lying(swings, turned(rolls)), [ARM], LENGTH)[0].value == 0.0
+
+
 def test_a_start_from_rest_is_sudden_and_a_swing_that_swells_is_not() -> None:
     still = np.zeros((20, 3))
     jerk = np.cumsum(np.where(np.arange(20) >= 10, 20.0, 1.0))

@@ -112,6 +112,9 @@ start: arms slip by 0.0009 and come to be 0.001 below the ground."""
 _SOFT: Final = 0.25
 """Share of the height that it needs within which a joint begins to be raised. At 0.5 Tiptoe has a
 jerk of 0.183 instead of 0.142."""
+_THIN: Final = 0.02
+"""Arm lengths of its radius that count for that at most where it just lets go. An arm that is 0.05
+thick dips by 0.003 into the ground then, and by 0.005 if all of it counts."""
 _AT_ONCE: Final = 40.0
 """How much faster than its hold an arm loses its stiffness against the ground: so it does not pass
 through it, as at 6, where it comes to be 0.005 below …"""
@@ -323,7 +326,8 @@ def kept_over_ground(
         near[own.touching :] += own.weight * _crested(own, ground)
         most = np.max(part.radii, axis=0) + rising
         loose = at_once * loose_from_root(part.reach, whole)
-        soft = _SOFT * (part.radii + off_ground * (most - part.radii)) + _TINY
+        thin = np.minimum(part.radii, _THIN * whole)
+        soft = _SOFT * (thin + off_ground * (most - thin)) + _TINY
         directions = directions.copy()
         directions[..., swinging] = raise_over_ground(
             directions[..., swinging],
