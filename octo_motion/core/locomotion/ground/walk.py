@@ -128,16 +128,11 @@ by 38° in a hold of Walk over bumps instead of 6°, and by 1.6° instead of 0.3
 _MOST_TURN: Final = 1.0
 """The same from one bone to the next, of arms of less than twelve bones: at 1 a bone that faces
 nearly right faces right. At 1.5 it goes beyond that, and what holds rolls by half as much again."""
-_IN_AIR: Final = 0.5
-"""Share of it in the air, where nothing slides if an arm rolls …"""
-_LANDS: Final = 6.0
-"""… but for the end of a swing. Bones of Hurry on a plane set out all at once at two places where
-it is all there all the time, those of Hurry over stairs where it comes with the last tenth."""
 _FIRST_TURN: Final = 0.15
 """Share of it at the root, which the body's skin surrounds, …"""
-_TURN_RISES: Final = 1.0 / 6.0
-"""… and how much more of it there is at each bone after that. At a third the web of Walk is inside
-out by 3.6 % of it, not 3.2 %, and bones of Hurry on a plane turn by 30.6°, not 29.8°."""
+_ALL_TURN: Final = 0.45
+"""… and of an arm from where on it is all there. At half of that the web of Walk is inside out by
+3.6 % of it, not 3.2 %, and bones of Hurry on a plane set out all at once at two places."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -324,10 +319,9 @@ class WalkPart:
         shape = segments, 3, len(to_armature), many
         back = np.ascontiguousarray(np.repeat(to_armature, many, axis=0).T)
         towards = components_first.rotate(back, -stance.upwards(segments)).reshape(shape)
-        along = np.minimum(_FIRST_TURN + _TURN_RISES * np.arange(segments), 1.0)
+        along = np.interp(np.arange(segments) / segments, (0.0, _ALL_TURN), (_FIRST_TURN, 1.0))
         most = min(_MOST_TURN, _TURN / segments) * along
-        holds = stance.weight * (_IN_AIR + (1.0 - _IN_AIR) * stance.weight**_LANDS)
-        turns = most[:, None, None] * holds.reshape(shape[2:])
+        turns = most[:, None, None] * stance.weight.reshape(shape[2:])
         return rotate_bones(
             [self.poser.rests[arm] for arm in columns],
             components_first.rotate(back, pose.directions).reshape(shape),
