@@ -255,7 +255,30 @@ def said(rows: Any) -> list[str]:
             f"{way} steps the {figure} in {row['median'] / lying['median']:.2f} times the time "
             "that ours takes."
         )
-    return [" ".join(result)] if result else ["MuJoCo could not be set up in this run."]
+    if not result:
+        return ["MuJoCo could not be set up in this run."]
+    return [" ".join(result), *_in_steps_of_springs(rows)]
+
+
+def _in_steps_of_springs(rows: Any) -> list[str]:
+    """Our steps counted in MuJoCo's with springs of the same figure, in a sentence: how fast the
+    machine is, and what else runs on it, is in both.
+    """
+    told = []
+    for row in rows:
+        figure, _, way = row["name"].partition(", lying, ")
+        if not way.endswith("springs"):
+            continue
+        ours = [
+            (each["name"].split(", ")[1].split()[0], each["median"] / row["median"])
+            for each in rows
+            if each["name"].startswith(f"{figure}, ") and ", lying, " not in each["name"]
+        ]
+        parts = ", ".join(f"{share:.1f} {doing}" for doing, share in ours)
+        told.append(f"of the {figure} {parts}")
+    if not told:
+        return []
+    return [f"In steps of MuJoCo with springs a step of ours takes, {'; '.join(told)}."]
 
 
 def measure_torn(steps: int, only: str = "") -> list[dict[str, Any]]:

@@ -124,7 +124,7 @@ _ASKEW: Final = np.radians(35.0)
 at 70°."""
 _TURN: Final = 12.0
 """Radians that the suckers of an arm are turned at most from root to tip. At 6 bones that hold roll
-by 38° in a hold of Walk over bumps instead of 6°, and by 1.6° instead of 0.3° in the mean."""
+by 38° in a hold of Walk over bumps instead of 4°, and by 1.6° instead of 0.3° in the mean."""
 _MOST_TURN: Final = 1.0
 """The same from one bone to the next, of arms of less than twelve bones: at 1 a bone that faces
 nearly right faces right. At 1.5 it goes beyond that, and what holds rolls by half as much again."""

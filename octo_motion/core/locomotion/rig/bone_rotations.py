@@ -170,7 +170,7 @@ def rotate_bones(
 
     Each bone is twisted by ``bank`` (bones, frames, arms), radians, about its own segment, against
     the bone before. Of the way that a side of the arms is to face, a bone that faces askew by θ is
-    turned by sin θ (1 + cos θ) / 2: nothing for one that faces right, and hardly anything for one
+    turned by sin θ cos(θ/2): nothing for one that faces right, and hardly anything for one
     that faces nearly away, which would have no better side to turn to. So it never flips.
     """
     bones, _, frames, arms = directions.shape
@@ -212,7 +212,7 @@ def rotate_bones(
             askew = aside * cosine + seen * sine
             # Where all face away, each would add its own to what those before it turned.
             right = seen * cosine - aside * sine
-            askew *= 0.5 * (1.0 + right)
+            askew *= np.sqrt(np.maximum(0.5 * (1.0 + right), 0.0))
             twisted += 0.5 * facing.most_turn[bone].reshape(batch) * askew
         if np.any(twisted):
             twist = np.concatenate([np.cos(twisted)[None], np.sin(twisted) * segments[bone]])
