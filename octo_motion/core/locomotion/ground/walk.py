@@ -129,8 +129,8 @@ _MOST_TURN: Final = 1.0
 """The same from one bone to the next, of arms of less than twelve bones: at 1 a bone that faces
 nearly right faces right. At 1.5 it goes beyond that, and what holds rolls by half as much again."""
 _IN_AIR: Final = 0.5
-"""Share of it beyond what lies on the ground. All of it, tips of Idle turn by 10° in a frame, not
-by 8°."""
+"""Share of it beyond what lies on the ground. With all of it tips of Curl turn by 17° in a frame,
+not by 15°."""
 _FIRST_TURN: Final = 0.15
 """Share of it at the root, which the body's skin surrounds, …"""
 _ALL_TURN: Final = 0.45
