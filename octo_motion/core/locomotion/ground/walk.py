@@ -124,18 +124,18 @@ _ASKEW: Final = np.radians(35.0)
 at 70°."""
 _TURN: Final = 12.0
 """Radians that the suckers of an arm are turned at most from root to tip. At 6 bones that hold roll
-by 38° in a hold of Walk over bumps instead of 4°, and by 1.6° instead of 0.3° in the mean."""
+by 29° in a hold of Walk over bumps instead of 4°, and by 1.5° instead of 0.3° in the mean."""
 _MOST_TURN: Final = 1.0
 """The same from one bone to the next, of arms of less than twelve bones: at 1 a bone that faces
-nearly right faces right. At 1.5 it goes beyond that, and what holds rolls by half as much again."""
-_IN_AIR: Final = 0.5
+nearly right faces right. At 1.5 it goes beyond that, and what holds rolls by 0.5° in the mean."""
+_FREE_TURN: Final = 0.5
 """Share of it beyond what lies on the ground. With all of it tips of Curl turn by 17° in a frame,
 not by 15°."""
 _FIRST_TURN: Final = 0.15
 """Share of it at the root, which the body's skin surrounds, …"""
 _ALL_TURN: Final = 0.45
-"""… and of an arm from where on it is all there. At half of that the web of Walk is inside out by
-3.6 % of it, not 3.2 %, and bones of Hurry on a plane set out all at once at two places."""
+"""… and of an arm from where on it is all there. At half of that four bones of Hurry on a plane set
+out all at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,7 +339,9 @@ def _turning(batch: Batch, stance: Stance) -> Floats:
     """
     first = batch.reach[stance.touching]
     lies = first + stance.weight * (stance.contact_to - first) - batch.reach[:-1]
-    return stance.weight * (_IN_AIR + (1.0 - _IN_AIR) * np.clip(lies / batch.lengths, 0.0, 1.0))
+    return stance.weight * (
+        _FREE_TURN + (1.0 - _FREE_TURN) * np.clip(lies / batch.lengths, 0.0, 1.0)
+    )
 
 
 def limbs_of(
