@@ -66,7 +66,7 @@ from .handover import (
     near_enough,
 )
 from .job import Creature, MotionJob, Tolerances, Trailing
-from .planning import MotionPlan, frames_of_arms, plan_motion, scaled
+from .planning import MotionPlan, frames_of_arms, plan_motion, ring_of_arms, scaled
 from .segments import SegmentedMotion
 from .trailing import trailed
 
@@ -358,6 +358,9 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     reached = None
     if plan.carry is None:
         reached = yield from scaled(_reaching(plan, arms, volume, keyed, going), 0.94, 0.94)
+    yield 0.96
+    if ring := ring_of_arms(creature.skeleton, creature.arms, creature.body):
+        arms.rotations = ring.rolled(arms.rotations, arms.strains)
     yield 0.96
     separate = partial(_separate, plan, arms, reached, going, volume, swimming=swimming)
     making_way = _making_way(plan, arms, reached, going, separate, cyclic=cyclic)

@@ -64,6 +64,7 @@ from ..path import (
 )
 from ..rig import (
     ArmFrames,
+    ArmRing,
     BodyFrame,
     frames_of_arm,
     joint_positions,
@@ -89,6 +90,7 @@ _posers: Final[ContentCache[GaitPoser]] = ContentCache(12)
 
 _unrolled_known: Final[ContentCache[tuple[Unrolled, Floats, np.ndarray] | None]] = ContentCache(2)
 _frames_known: Final[ContentCache[list[ArmFrames]]] = ContentCache(4)
+_rings_known: Final[ContentCache[ArmRing | None]] = ContentCache(4)
 
 
 def frames_of_arms(skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame) -> list[ArmFrames]:
@@ -97,6 +99,14 @@ def frames_of_arms(skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame) -
     return _frames_known.get(
         content_key(skeleton, bones, body),
         lambda: [frames_of_arm(skeleton, each, body) for each in bones],
+    )
+
+
+def ring_of_arms(skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame) -> ArmRing | None:
+    """The arms that stand side by side round the body; none where none do."""
+    return _rings_known.get(
+        content_key(skeleton, [arm.bones for arm in arms], body),
+        lambda: ArmRing.of(frames_of_arms(skeleton, arms, body), body),
     )
 
 

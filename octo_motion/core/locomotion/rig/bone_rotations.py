@@ -16,7 +16,7 @@ know no tails, may stand across its arm.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -37,6 +37,7 @@ from ...rotations import (
 )
 from ...rotations.components_first import cumulative_sum, dot
 from ...skeleton import Skeleton
+from ...smoothing import smooth_step
 from .arm_chains import AXES, BodyFrame, joint_positions
 
 _NO_SIDE: Final = 0.1
@@ -532,3 +533,208 @@ def turns_in_world(
     np.arccos(result, out=result)
     result *= 2.0
     return result
+
+
+# --- Arms that roll towards their neighbours, where one skin joins them ---------------------------
+#
+# Near the body arms side by side share a skin, and a web goes on between them. Their suckers look
+# down whatever the neighbours do: where an arm comes to be above or below the next one, the skin
+# between them stands upright, and was turned inside out. So arms roll there about themselves, to
+# lie between their neighbours as they do at rest; their joints stay where they are.
+
+
+_WIDEST_GAP: Final = np.radians(100.0)
+"""Between arms that stand side by side, seen from above: of fewer than four none do."""
+_ROLLS: Final = ((0.0, 0.1, 0.35, 0.5), (0.0, 1.0, 1.0, 0.0))
+"""How far parts of an arm roll, by shares of its length: a web reaches a third of it."""
+_FREE: Final = np.radians(30.0)
+"""How askew arms may be without rolling. At 20° three bones of Hurry over bumps set out all at
+once; at 45° 0.9 % of the web is inside out in a walk on a plane, instead of nothing."""
+_MOST: Final = np.radians(75.0)
+"""What they roll by at most, and by all that is not free as long as that is little. At 60° 2.7 % of
+the web is inside out in a walk up stairs instead of 0.8 %."""
+_TOO_FAR: Final = np.radians(110.0)
+"""From here on they roll less, and half a turn askew not at all: either way would be as good."""
+_NEAR: Final = 0.5
+"""Of how far apart the neighbours are at rest: where they are nearer to each other, it is less and
+less told which side is whose."""
+_SURE: Final = 0.01
+"""Arm lengths that they are apart at rest, across a bone, to tell it anything."""
+_TINY: Final = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class _Roots:
+    """Bones of arms, as many of each, that roll, and one more, which gives back what they turn."""
+
+    batch: ArmBatch
+    places: np.ndarray
+    """(bones, arms) among the bones of all arms."""
+
+    def standing(self, rotations: Floats, strains: Floats) -> tuple[Floats, Floats]:
+        """Orientations (4, bones · arms, moments) and joints (3, (bones + 1) · arms, moments),
+        armature space, of rotations (moments, bones, 4) and strains (moments, bones) of all arms.
+        """
+        (bones, arms), moments = self.places.shape, len(rotations)
+        own = rotations.transpose(1, 2, 0)[self.places].swapaxes(1, 2)
+        turned = self.batch.orientations(own, EACH_ARM)
+        longer = strains.T[self.places].reshape(bones, -1)
+        joints = self.batch.joints(turned.reshape(bones, 4, -1), self._arm(moments), longer)
+        return (
+            turned.swapaxes(0, 1).reshape(4, bones * arms, moments),
+            joints.swapaxes(0, 1).reshape(3, (bones + 1) * arms, moments),
+        )
+
+    def rotations(self, orientations: Floats) -> Floats:
+        """Rotations (moments, bones, arms, 4) of orientations (4, bones · arms, moments)."""
+        (bones, arms), moments = self.places.shape, orientations.shape[-1]
+        turned = orientations.reshape(4, bones, -1).swapaxes(0, 1)
+        own = self.batch.rotations(turned, self._arm(moments))
+        return own.reshape(bones, 4, arms, moments).transpose(3, 0, 2, 1)
+
+    def _arm(self, moments: int) -> np.ndarray:
+        return np.repeat(np.arange(self.places.shape[1]), moments)
+
+
+@dataclass(frozen=True, eq=False)
+class ArmRing:
+    """Arms side by side round a body; bones are those near it, of all arms."""
+
+    roots: tuple[_Roots, ...]
+    beside: np.ndarray
+    """(2, 2, bones) joints, among those of all arms: of the neighbours before and after, the one
+    before and the one after the place beside the middle of a bone, …"""
+    part: Floats
+    """… and how far (2, bones, 1) that place is from one to the other, 0…1."""
+    axes: Floats
+    """(3, 3, bones) unit vectors in the bones' rest frames: along their segments, across these
+    towards the neighbour after, and square to both."""
+    apart: Floats
+    """(bones, 1) of the neighbours at rest, across, armature units; infinite where that tells
+    nothing."""
+    share: Floats
+    """(bones, 1) how far each bone rolls, 0…1."""
+
+    @classmethod
+    def of(cls, arms: Sequence[ArmFrames], body: BodyFrame) -> ArmRing | None:
+        """Some arms as they stand at rest round their body; none where none stand side by side."""
+        neighbours = _neighbours(arms, body)
+        if not neighbours:
+            return None
+        first = np.cumsum([0, *(len(arm.bones) for arm in arms)])
+        roots: list[_Roots] = []
+        bones: list[tuple[int, int]] = []
+        joints: dict[tuple[int, int], int] = {}
+        for numbers, batch in batches_by_bones([_inner(arm) for arm in arms]):
+            count = len(batch.lengths)
+            roots.append(_Roots(batch, np.arange(count)[:, None] + first[numbers]))
+            bones += [(number, bone) for bone in range(count) for number in numbers]
+            for joint in range(count + 1):
+                joints |= {(number, joint): len(joints) + at for at, number in enumerate(numbers)}
+        beside, part = np.zeros((2, 2, len(bones)), dtype=np.int64), np.zeros((2, len(bones), 1))
+        share = np.zeros((len(bones), 1))
+        for row, (number, bone) in enumerate(bones):
+            if number not in neighbours:
+                continue
+            arm = arms[number]
+            middle = 0.5 * (arm.reach[bone] + arm.reach[bone + 1]) / arm.length
+            share[row] = np.interp(middle, *_ROLLS)
+            for side, other in enumerate(neighbours[number]):
+                reach = arms[other].reach / arms[other].length
+                at = int(np.searchsorted(reach, middle, side="right")) - 1
+                at = min(at, _count(arms[other]) - 1)
+                beside[side, :, row] = joints[other, at], joints[other, at + 1]
+                part[side, row] = min((middle - reach[at]) / (reach[at + 1] - reach[at]), 1.0)
+        along = np.concatenate(
+            [each.batch.segments.swapaxes(0, 1).reshape(3, -1) for each in roots], 1
+        )
+        axes = np.stack([along, 0.0 * along, 0.0 * along])
+        still = cls(tuple(roots), beside, part, axes, np.ones((len(bones), 1)), share)
+        return still._as_at_rest(arms)
+
+    def _as_at_rest(self, arms: Sequence[ArmFrames]) -> ArmRing:
+        """The same, which knows how arms lie between their neighbours at rest."""
+        count = sum(len(arm.bones) for arm in arms)
+        rest = np.zeros((1, count, 4))
+        rest[..., 0] = 1.0
+        _, line = self._standing(rest, np.zeros((1, count)))
+        along, line = self.axes[0], line[..., 0]
+        across = line - dot(along, line) * along
+        apart = np.sqrt(dot(across, across))
+        side = across / np.maximum(apart, _TINY)
+        # A neighbour straight ahead of a bone is on no side of it.
+        sure = apart > _SURE * max(arm.length for arm in arms)
+        return replace(
+            self,
+            axes=np.stack([along, side, components_first.cross(along, side)]),
+            apart=np.where(sure, apart, np.inf)[:, None],
+        )
+
+    def _standing(self, rotations: Floats, strains: Floats) -> tuple[Floats, Floats]:
+        """Orientations (4, bones, moments), armature space, and the lines (3, bones, moments) from
+        the neighbour before to the one after beside each bone, in its own frame.
+        """
+        found = [each.standing(rotations, strains) for each in self.roots]
+        turned, joints = (np.concatenate(each, axis=1) for each in zip(*found, strict=True))
+        before, after = (
+            joints[:, first] + part * (joints[:, second] - joints[:, first])
+            for (first, second), part in zip(self.beside, self.part, strict=True)
+        )
+        back = components_first.conjugate(turned.reshape(4, -1))
+        line = components_first.rotate(back, (after - before).reshape(3, -1))
+        return turned, line.reshape(before.shape)
+
+    def rolled(self, rotations: Floats, strains: Floats) -> Floats:
+        """Rotations (moments, bones, 4) of all bones of all arms, one after the other, in their
+        rest frames, of arms that roll; they are longer than at rest by strains (moments, bones).
+        """
+        turned, line = self._standing(rotations, strains)
+        along, side, square = self.axes
+        side, square = (np.einsum("cb,cbm->bm", each, line) for each in (side, square))
+        told = np.minimum(np.hypot(side, square) / (_NEAR * self.apart), 1.0)
+        half = 0.5 * self.share * told * _rolling(np.arctan2(square, side))
+        twist = np.concatenate([np.cos(half)[None], np.sin(half) * along[..., None]])
+        flat = turned.reshape(4, -1), twist.reshape(4, -1)
+        turned = components_first.multiply(*flat).reshape(turned.shape)
+        result, start = rotations.copy(), 0
+        for each in self.roots:
+            part = slice(start, start + each.places.size)
+            result[:, each.places] = each.rotations(turned[:, part])
+            start = part.stop
+        return result
+
+
+def _neighbours(arms: Sequence[ArmFrames], body: BodyFrame) -> dict[int, tuple[int, int]]:
+    """Numbers of the arms before and after those that stand beside both."""
+    roots = (np.array([arm.root for arm in arms]) - body.center) @ body.rotation
+    azimuths = np.arctan2(roots[:, 1], roots[:, 0])
+    order = np.argsort(azimuths, kind="stable")
+    gaps = np.diff(azimuths[order], append=azimuths[order[0]] + 2.0 * np.pi)
+    beside = np.maximum(gaps, np.roll(gaps, 1)) < _WIDEST_GAP
+    around = zip(order, np.roll(order, 1), np.roll(order, -1), beside, strict=True)
+    return {int(arm): (int(before), int(after)) for arm, before, after, near in around if near}
+
+
+def _count(arm: ArmFrames) -> int:
+    """How many of an arm's bones roll, and one more."""
+    return min(int(np.searchsorted(arm.along, _ROLLS[0][-1])) + 1, len(arm.bones))
+
+
+def _inner(arm: ArmFrames) -> ArmFrames:
+    """An arm of these bones."""
+    rest, count = arm.rest, _count(arm)
+    return ArmFrames(
+        arm.bones[:count],
+        arm.root,
+        arm.lengths[:count],
+        ArmRest(rest.segments[:count], rest.carried[:count], rest.follows[:count], rest.outward),
+        arm.own[:count],
+    )
+
+
+def _rolling(askew: Floats) -> Floats:
+    """Radians that bones roll by which are so askew (any shape) between their neighbours."""
+    size = np.abs(askew)
+    beyond = np.maximum(size - _FREE, 0.0)
+    lasting = smooth_step((np.pi - size) / (np.pi - _TOO_FAR))
+    return np.sign(askew) * _MOST * np.tanh(beyond / _MOST) * lasting
