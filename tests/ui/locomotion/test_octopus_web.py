@@ -53,14 +53,19 @@ def played(setup: str, ground: str) -> tuple[Web, float]:
     return web(recording, Surface.of(scene.ground), length), through.share
 
 
-_INSIDE_OUT = {"walk": (0.035, 0.0012), "hurry": (0.03, 0.001), "prowl": (0.048, 0.0019)}
+_INSIDE_OUT = {
+    ("hurry", "plane"): (0.012, 0.0012),
+    ("prowl", "plane"): (0.03, 0.0012),
+    ("walk", "stairs"): (0.02, 0.0005),
+}
 """Share of the web's area that may be inside out where arms cross a neighbour, at the worst moment
-and in the mean of all: 3.2 % and 0.09 % in a walk, 0.8 % and 0.06 % in a hurry (2 % at some frame
-in between), 4.2 % and 0.18 % in a prowl. Elsewhere no face is."""
+and in the mean of all: 0.6 % and 0.06 % in a hurry, 1.9 % and 0.06 % in a prowl, 0.8 % and 0.01 %
+in a walk up stairs. Elsewhere no face is."""
 
 
 @pytest.mark.parametrize(
-    ("setup", "ground"), [*((setup, "plane") for setup in SETUPS), ("walk", "bumps")]
+    ("setup", "ground"),
+    [*((setup, "plane") for setup in SETUPS), ("walk", "bumps"), ("walk", "stairs")],
 )
 def test_it_stays_whole_and_above_the_ground(
     setup: str,
@@ -73,8 +78,8 @@ def test_it_stays_whole_and_above_the_ground(
         assert found.deepest.value == 0.0
     # 1.3 in a swim, 2.0 in a walk, 2.3 where it hurries.
     assert 1.0 < found.stretch.value < 3.5
-    worst, mean = _INSIDE_OUT.get(setup, (0.0, 0.0))
+    worst, mean = _INSIDE_OUT.get((setup, ground), (0.0, 0.0))
     assert found.inside_out.value <= worst
     assert found.turned_over <= mean
-    # Of few moments: 6 % in a walk, 12 % over bumps, where an arm's own skin goes through another.
+    # Of few moments: 11 % in Idle, where the roots of the front arms fold, 2 % in a prowl.
     assert through < 0.15

@@ -359,12 +359,12 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     if plan.carry is None:
         reached = yield from scaled(_reaching(plan, arms, volume, keyed, going), 0.94, 0.94)
     yield 0.96
-    if ring := ring_of_arms(creature.skeleton, creature.arms, creature.body):
-        arms.rotations = ring.rolled(arms.rotations, arms.strains)
-    yield 0.96
     separate = partial(_separate, plan, arms, reached, going, volume, swimming=swimming)
     making_way = _making_way(plan, arms, reached, going, separate, cyclic=cyclic)
     warnings, turning = yield from scaled(making_way, 0.96, 0.98)
+    rolled = beside_neighbours(plan, arms)
+    if rolled is not arms.rotations:
+        arms.rotations, turning = rolled, None
     yield 0.98
     if hands or job.in_place or job.body.trailing is not None or plan.carry is not None:
         # What plays is another motion yet.
@@ -383,6 +383,16 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
         keyed = going = object_transforms(creature.body, creature.scale, *eased)
     shown = (arms, going, own, keyed, swimming, reached, warnings, hands, planned, turning)
     return _Posed(travel.phase, *shown)
+
+
+def beside_neighbours(plan: MotionPlan, arms: ArmMotion) -> Floats:
+    """Rotations (moments, bones, 4) of arms that roll towards their neighbours."""
+    creature = plan.job.creature
+    ring = ring_of_arms(creature.skeleton, creature.arms, creature.body)
+    if ring is None:
+        return arms.rotations
+    cycle = plan.pace.fastest / plan.job.timing.rate
+    return ring.rolled(arms.rotations, arms.strains, cycle)
 
 
 def _body_of(creature: Creature, going: Travelled) -> Travelled:

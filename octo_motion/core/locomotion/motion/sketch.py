@@ -28,6 +28,7 @@ from .pipeline import (
     Body,
     Glimpsed,
     KnownMotion,
+    beside_neighbours,
     body_at,
     glimpsed,
     organs_at,
@@ -126,7 +127,7 @@ class Sketch:
         """
         plan, moment = finished(plan_near(job, self._known.plan, frame, frame))
         body = body_at(plan, plan.moments[1][moment])
-        arms = finished(plan.segments.posing_by_themselves(body.travel, body.places))
+        arms = finished(_by_themselves(plan, body))
         come = float(body.travel.distance[0]) / plan.schedule.travel.stride
         moments = np.arange(len(self._strides), dtype=np.float64)
         near = round(float(np.interp(come, self._strides, moments)))
@@ -179,7 +180,7 @@ class Sketch:
         yield 0.4
         body = body_at(plan, plan.moments[1][part])
         yield 0.5
-        bare = yield from plan.segments.posing_by_themselves(body.travel, body.places)
+        bare = yield from _by_themselves(plan, body)
         whole = known.arms.at(slice(first - begin, last - begin))
         self._made[anew] = _Made(
             first,
@@ -208,6 +209,14 @@ class Sketch:
             rotations=multiply(arms.rotations, turns),
             strains=arms.strains + here + share * (then - here),
         )
+
+
+def _by_themselves(plan: MotionPlan, body: Body) -> Generator[float, None, ArmMotion]:
+    """Arms in the gait and on their footholds, and between their neighbours as they are there, in
+    steps.
+    """
+    arms = yield from plan.segments.posing_by_themselves(body.travel, body.places)
+    return replace(arms, rotations=beside_neighbours(plan, arms))
 
 
 def _phases(plan: MotionPlan, body: Body) -> Floats:

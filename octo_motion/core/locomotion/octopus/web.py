@@ -28,18 +28,16 @@ from .surface import (
     sheet_quads,
 )
 
-_MIDDLE: Final = 0.7
+_MIDDLE: Final = 0.65
 """Depth of the margin's arch: how far its middle reaches, of the straight line between arms. Where
 it reaches further, arms that swing across each other turn more of it over."""
-_ARCH: Final = 2.2
+_ARCH: Final = 3.3
 """Power of the arch's form, that of a chain."""
-_SAG: Final = 0.3
+_SAG: Final = 0.06
 """How far the middle hangs below the arms' middle lines, of the height of those over ground."""
-_OWN: Final = 0.15
+_OWN: Final = 0.2
 """Share of the way to the middle that goes with its own arm alone, at the margin."""
-_EVEN: Final = 0.56
-"""How even the shares of two arms are across the rest of the web, 0 to 1."""
-_SLOWER: Final = 0.7
+_SLOWER: Final = 0.66
 """How fast the bones along the arms change in the web, of how fast they do on the arms."""
 _SOON: Final = 6.0
 """How steeply they come to that beside an arm."""
@@ -122,15 +120,12 @@ def _influences(
 
     Between the arms the bones change slower than the place: what an arm's bend turns about a point
     further in is drawn together less on the inside of the bend. Beside an arm the web is its own;
-    from there on the shares are half way between even ones, with which the web shrinks evenly where
-    arms close in, and ones that begin and end flat, with which it leaves each arm as it does at
-    rest.
+    from there on the shares begin and end flat, with which it leaves each arm as it does at rest.
     """
     shape, half = layout.shape, layout.columns.web // 2
     own = _OWN * grown
     inwards = np.maximum(v - own, 0.0) / (1.0 - own)
-    smooth = ramp(0.0, 1.0, inwards)
-    near = 0.5 * (smooth + (inwards - smooth) * _EVEN * ramp(0.0, 0.5, grown))
+    near = 0.5 * ramp(0.0, 1.0, inwards)
     share = np.where(np.arange(2 * half - 1) < half, near, 1.0 - near)
     where = np.clip(radius - shape.crown_radius, 0.0, distance[:, None])
     margin = _margin(layout, v)

@@ -547,14 +547,17 @@ _WIDEST_GAP: Final = np.radians(100.0)
 """Between arms that stand side by side, seen from above: of fewer than four none do."""
 _ROLLS: Final = ((0.0, 0.1, 0.35, 0.5), (0.0, 1.0, 1.0, 0.0))
 """How far parts of an arm roll, by shares of its length: a web reaches a third of it."""
-_FREE: Final = np.radians(30.0)
-"""How askew arms may be without rolling. At 20° three bones of Hurry over bumps set out all at
-once; at 45° 0.9 % of the web is inside out in a walk on a plane, instead of nothing."""
-_MOST: Final = np.radians(75.0)
-"""What they roll by at most, and by all that is not free as long as that is little. At 60° 2.7 % of
-the web is inside out in a walk up stairs instead of 0.8 %."""
+_FREE: Final = np.radians(15.0)
+"""How askew arms may be without rolling …"""
+_ROLLED: Final = 0.6
+"""… how much they roll of what is beyond that, as long as it is little …"""
+_MOST_ROLL: Final = np.radians(90.0)
+"""… and at most. At 1 for 0.6 a bone of a walk turns by 24° in a frame instead of 20°."""
 _TOO_FAR: Final = np.radians(110.0)
 """From here on they roll less, and half a turn askew not at all: either way would be as good."""
+_IN_TIME: Final = (1.0, 1.8)
+"""Seconds of a cycle up to which arms have no time to roll, and from which on all of it. Without
+that a bone of Hurry over bumps and on a slope each sets out all at once."""
 _NEAR: Final = 0.5
 """Of how far apart the neighbours are at rest: where they are nearer to each other, it is less and
 less told which side is whose."""
@@ -684,15 +687,20 @@ class ArmRing:
         line = components_first.rotate(back, (after - before).reshape(3, -1))
         return turned, line.reshape(before.shape)
 
-    def rolled(self, rotations: Floats, strains: Floats) -> Floats:
+    def rolled(self, rotations: Floats, strains: Floats, cycle: float) -> Floats:
         """Rotations (moments, bones, 4) of all bones of all arms, one after the other, in their
-        rest frames, of arms that roll; they are longer than at rest by strains (moments, bones).
+        rest frames, of arms that roll; they are longer than at rest by strains (moments, bones),
+        and go through a cycle in so many seconds.
         """
+        from_seconds, to_seconds = _IN_TIME
+        time = smooth_step(np.asarray((cycle - from_seconds) / (to_seconds - from_seconds)))
+        if time <= 0.0:
+            return rotations
         turned, line = self._standing(rotations, strains)
         along, side, square = self.axes
         side, square = (np.einsum("cb,cbm->bm", each, line) for each in (side, square))
         told = np.minimum(np.hypot(side, square) / (_NEAR * self.apart), 1.0)
-        half = 0.5 * self.share * told * _rolling(np.arctan2(square, side))
+        half = 0.5 * time * self.share * told * _rolling(np.arctan2(square, side))
         twist = np.concatenate([np.cos(half)[None], np.sin(half) * along[..., None]])
         flat = turned.reshape(4, -1), twist.reshape(4, -1)
         turned = components_first.multiply(*flat).reshape(turned.shape)
@@ -737,4 +745,4 @@ def _rolling(askew: Floats) -> Floats:
     size = np.abs(askew)
     beyond = np.maximum(size - _FREE, 0.0)
     lasting = smooth_step((np.pi - size) / (np.pi - _TOO_FAR))
-    return np.sign(askew) * _MOST * np.tanh(beyond / _MOST) * lasting
+    return np.sign(askew) * _MOST_ROLL * np.tanh(_ROLLED * beyond / _MOST_ROLL) * lasting
