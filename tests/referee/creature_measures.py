@@ -19,6 +19,10 @@ from .surface import Surface
 
 NEAR = 0.012
 """Arm lengths over the ground: skin that is nearer lies on it."""
+TOUCHES = 0.002
+"""Arm lengths over the ground: skin that is nearer touches it."""
+_SOME = 4
+"""Of so many vertices one is followed."""
 LONG = 0.3
 """Seconds: what lies for less is passing by."""
 CARRIED = 0.5
@@ -172,6 +176,39 @@ def resting(
                 frame = recording.frames[inside][int(np.argmax(away))]
                 drift = Worst(float(away.max()), float(frame), name)
     return Resting(slip, drift, counted / rests.size)
+
+
+def creeping(recording: Recording, surface: Surface, length: float) -> Worst:
+    """How far skin that touches the ground slides along it in one hold, in arm lengths.
+
+    Vertex by vertex, one of a few, webs left out: what peels off touches no more, and does not
+    count. Otherwise as :func:`resting` has it.
+    """
+    seconds = 1.0 / recording.fps
+    body = np.linalg.norm(np.diff(recording.heads[:, _root(recording)], axis=0), axis=-1)
+    slow = np.maximum(CARRIED * body, CREEPING * length * seconds)[:, None]
+    worst = Worst(0.0, recording.frames[0])
+    for skin in recording.skins:
+        near = surface.near(skin.points[:, ::_SOME], TOUCHES * length) & ~skin.web[::_SOME]
+        picked = near.any(axis=0)
+        near, bones = near[:, picked], skin.bones[::_SOME][picked]
+        points = skin.points[:, ::_SOME][:, picked].astype(float)
+        below = points.copy()
+        below[near, 2] = surface.heights(points[near])
+        touches = near & (points[..., 2] - below[..., 2] < TOUCHES * length)
+        moved = np.linalg.norm(np.diff(points, axis=0), axis=-1) > slow
+        touches &= ~(np.pad(moved, ((1, 0), (0, 0))) | np.pad(moved, ((0, 1), (0, 0))))
+        for column in np.flatnonzero(touches.any(axis=0)).tolist():
+            for first, last in _runs(touches[:, column]):
+                if (last - first) * seconds < LONG:
+                    continue
+                path = below[first + 1 : last - 1, column] / length
+                away = np.linalg.norm(path - path[len(path) // 2], axis=-1)
+                if away.max() > worst.value:
+                    frame = recording.frames[first + 1 + int(np.argmax(away))]
+                    name = recording.names[bones[column]] if bones[column] >= 0 else ""
+                    worst = Worst(float(away.max()), float(frame), name)
+    return worst
 
 
 def rolling(

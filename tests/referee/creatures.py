@@ -20,6 +20,7 @@ RATES = (24, 48, 96)
 UNITS = {
     "slip": "% of an arm in a frame",
     "drift": "% of an arm in a hold",
+    "creep": "% of an arm in a hold, of skin that touches the ground, along it",
     "roll": "° in a hold, of a bone whose ends keep still",
     "sink": "% of an arm, deepest skin",
     "sunk": "% of the moments with skin deeper than 0.5 % of an arm",
@@ -71,6 +72,7 @@ def measure(scene: Scene) -> dict[str, Figure]:
     return {
         "slip": Figure.worst(rest.slip, 100.0),
         "drift": Figure.worst(rest.drift, 100.0),
+        "creep": Figure.worst(measures.creeping(whole, surface, length), 100.0),
         "roll": Figure.worst(measures.rolling(whole, scene.arms, length)[0]),
         "sink": Figure.worst(sink.deepest, 100.0),
         "sunk": Figure(100.0 * sink.share),

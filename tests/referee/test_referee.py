@@ -162,6 +162,33 @@ def test_a_bone_that_rolls_while_its_ends_keep_still_is_told_and_one_that_swings
     assert measures.rolling(lying(swings, turned(rolls)), [ARM], LENGTH)[0].value == 0.0
 
 
+def crept(places: Floats) -> float:
+    """How far skin creeps that is an arm along x, (moments, 3) where it begins, on a plane."""
+    along = np.linspace(0.0, 0.999, 400)
+    skin = Skin(
+        points=places[:, None] + along[:, None] * [1.0, 0.0, 0.0],
+        rest=along[:, None] * [1.0, 0.0, 0.0],
+        edges=np.empty((0, 2), dtype=np.int64),
+        faces=[],
+        bones=1 + (along * 4.0).astype(int),
+        web=np.zeros(len(along), dtype=bool),
+    )
+    return measures.creeping(replace(lying(places), skins=[skin]), ground(), LENGTH).value
+
+
+def test_skin_that_creeps_while_it_touches_is_told_and_what_peels_off_is_not() -> None:
+    steps = np.linspace(0.0, 0.02, 48)[:, None]
+    assert crept(np.zeros((48, 3))) == 0.0
+    # From the middle of the hold to its end, whose last moments are left out.
+    assert crept(steps * [0.0, 1.0, 0.0]) == pytest.approx(0.01, rel=0.1)
+    # Once it is off it does not matter where it goes.
+    rising = np.where(np.arange(48) >= 24, 0.003, 0.0)[:, None] * [0.0, 0.0, 1.0]
+    later = np.maximum(steps - steps[24], 0.0) * [0.0, 1.0, 0.0]
+    assert crept(rising + later) == 0.0
+    # Nor does skin that is carried along.
+    assert crept(np.arange(48)[:, None] * [0.02, 0.0, 0.0]) == 0.0
+
+
 def test_a_start_from_rest_is_sudden_and_a_swing_that_swells_is_not() -> None:
     still = np.zeros((20, 3))
     jerk = np.cumsum(np.where(np.arange(20) >= 10, 20.0, 1.0))
