@@ -28,16 +28,18 @@ from .surface import (
     sheet_quads,
 )
 
-_MIDDLE: Final = 0.65
+_MIDDLE: Final = 0.69
 """Depth of the margin's arch: how far its middle reaches, of the straight line between arms. Where
 it reaches further, arms that swing across each other turn more of it over."""
-_ARCH: Final = 3.3
+_ARCH: Final = 2.5
 """Power of the arch's form, that of a chain."""
-_SAG: Final = 0.06
+_SAG: Final = 0.38
 """How far the middle hangs below the arms' middle lines, of the height of those over ground."""
-_OWN: Final = 0.2
+_OWN: Final = 0.11
 """Share of the way to the middle that goes with its own arm alone, at the margin."""
-_SLOWER: Final = 0.66
+_EVEN: Final = 0.43
+"""How even the shares of two arms are across the rest of the web, 0 to 1."""
+_SLOWER: Final = 0.64
 """How fast the bones along the arms change in the web, of how fast they do on the arms."""
 _SOON: Final = 6.0
 """How steeply they come to that beside an arm."""
@@ -120,12 +122,15 @@ def _influences(
 
     Between the arms the bones change slower than the place: what an arm's bend turns about a point
     further in is drawn together less on the inside of the bend. Beside an arm the web is its own;
-    from there on the shares begin and end flat, with which it leaves each arm as it does at rest.
+    from there on the shares are half way between even ones, with which the web shrinks evenly where
+    arms close in, and ones that begin and end flat, with which it leaves each arm as it does at
+    rest.
     """
     shape, half = layout.shape, layout.columns.web // 2
     own = _OWN * grown
     inwards = np.maximum(v - own, 0.0) / (1.0 - own)
-    near = 0.5 * ramp(0.0, 1.0, inwards)
+    smooth = ramp(0.0, 1.0, inwards)
+    near = 0.5 * (smooth + (inwards - smooth) * _EVEN * ramp(0.0, 0.5, grown))
     share = np.where(np.arange(2 * half - 1) < half, near, 1.0 - near)
     where = np.clip(radius - shape.crown_radius, 0.0, distance[:, None])
     margin = _margin(layout, v)
