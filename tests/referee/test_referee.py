@@ -96,12 +96,10 @@ def test_what_is_in_the_air_does_not_rest() -> None:
     assert measures.resting(lying(raised), [ARM], ground(), LENGTH).share == 0.0
 
 
-def held_on_a_wall(places: Floats) -> Held:
-    """How an arm with a skin along its bones keeps to a wall that faces -y; (moments, 3) where the
-    arm begins.
-    """
+def line_of_skin(places: Floats) -> Skin:
+    """Skin of an arm along x, (moments, 3) where it begins."""
     along = np.linspace(0.0, 0.999, 400)
-    skin = Skin(
+    return Skin(
         points=places[:, None] + along[:, None] * [1.0, 0.0, 0.0],
         rest=along[:, None] * [1.0, 0.0, 0.0],
         edges=np.empty((0, 2), dtype=np.int64),
@@ -109,12 +107,18 @@ def held_on_a_wall(places: Floats) -> Held:
         bones=1 + (along * 4.0).astype(int),
         web=np.zeros(len(along), dtype=bool),
     )
+
+
+def held_on_a_wall(places: Floats) -> Held:
+    """How an arm with a skin along its bones keeps to a wall that faces -y; (moments, 3) where the
+    arm begins.
+    """
     corners = 3.0 * np.array(
         [[-1.0, 0.0, -1.0], [1.0, 0.0, -1.0], [1.0, 0.0, 1.0], [-1.0, 0.0, 1.0]]
     )
     wall = np.broadcast_to(corners, (len(places), 4, 3))
     ground = HeldGround(wall, np.array([[0, 1, 2], [0, 2, 3]]), 1.0)
-    return held(replace(lying(places), skins=[skin]), [ARM], ground, LENGTH)
+    return held(replace(lying(places), skins=[line_of_skin(places)]), [ARM], ground, LENGTH)
 
 
 def test_an_arm_that_holds_a_wall_is_neither_in_it_nor_drifts() -> None:
@@ -164,16 +168,9 @@ def test_a_bone_that_rolls_while_its_ends_keep_still_is_told_and_one_that_swings
 
 def crept(places: Floats) -> float:
     """How far skin creeps that is an arm along x, (moments, 3) where it begins, on a plane."""
-    along = np.linspace(0.0, 0.999, 400)
-    skin = Skin(
-        points=places[:, None] + along[:, None] * [1.0, 0.0, 0.0],
-        rest=along[:, None] * [1.0, 0.0, 0.0],
-        edges=np.empty((0, 2), dtype=np.int64),
-        faces=[],
-        bones=1 + (along * 4.0).astype(int),
-        web=np.zeros(len(along), dtype=bool),
-    )
-    return measures.creeping(replace(lying(places), skins=[skin]), ground(), LENGTH).value
+    return measures.creeping(
+        replace(lying(places), skins=[line_of_skin(places)]), ground(), LENGTH
+    ).value
 
 
 def test_skin_that_creeps_while_it_touches_is_told_and_what_peels_off_is_not() -> None:
