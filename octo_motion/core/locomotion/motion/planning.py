@@ -66,6 +66,7 @@ from ..rig import (
     ArmFrames,
     ArmRing,
     BodyFrame,
+    arm_azimuths,
     frames_of_arm,
     joint_positions,
     lies_back,
@@ -104,9 +105,12 @@ def frames_of_arms(skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame) -
 
 def ring_of_arms(skeleton: Skeleton, arms: tuple[Arm, ...], body: BodyFrame) -> ArmRing | None:
     """The arms that stand side by side round the body; none where none do."""
+    bones = [arm.bones for arm in arms]
     return _rings_known.get(
-        content_key(skeleton, [arm.bones for arm in arms], body),
-        lambda: ArmRing.of(frames_of_arms(skeleton, arms, body), body),
+        content_key(skeleton, bones, body),
+        lambda: ArmRing.of(
+            frames_of_arms(skeleton, arms, body), arm_azimuths(skeleton, bones, body)
+        ),
     )
 
 

@@ -619,9 +619,11 @@ class ArmRing:
     """(bones, 1) how far each bone rolls, 0…1."""
 
     @classmethod
-    def of(cls, arms: Sequence[ArmFrames], body: BodyFrame) -> ArmRing | None:
-        """Some arms as they stand at rest round their body; none where none stand side by side."""
-        neighbours = _neighbours(arms, body)
+    def of(cls, arms: Sequence[ArmFrames], azimuths: Floats) -> ArmRing | None:
+        """Some arms as they stand at rest round their body, at so many radians (arms,); none where
+        none stand side by side.
+        """
+        neighbours = _neighbours(azimuths)
         if not neighbours:
             return None
         first = np.cumsum([0, *(len(arm.bones) for arm in arms)])
@@ -712,10 +714,10 @@ class ArmRing:
         return result
 
 
-def _neighbours(arms: Sequence[ArmFrames], body: BodyFrame) -> dict[int, tuple[int, int]]:
-    """Numbers of the arms before and after those that stand beside both."""
-    roots = (np.array([arm.root for arm in arms]) - body.center) @ body.rotation
-    azimuths = np.arctan2(roots[:, 1], roots[:, 0])
+def _neighbours(azimuths: Floats) -> dict[int, tuple[int, int]]:
+    """Numbers of the arms before and after those that stand beside both, by where (arms,) all do,
+    radians.
+    """
     order = np.argsort(azimuths, kind="stable")
     gaps = np.diff(azimuths[order], append=azimuths[order[0]] + 2.0 * np.pi)
     beside = np.maximum(gaps, np.roll(gaps, 1)) < _WIDEST_GAP

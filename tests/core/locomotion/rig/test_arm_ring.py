@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from octo_motion.core.locomotion.rig import ArmFrames, ArmRing, BodyFrame, frames_of_arm
+from octo_motion.core.locomotion.rig import ArmFrames, ArmRing, arm_azimuths, frames_of_arm
 from octo_motion.core.rotations import Floats, from_axis_angle, multiply, rotate
 from tests.core.rigs import body_with_arms
 
@@ -15,15 +15,18 @@ SLOW = 3.0
 """Seconds of a cycle in which there is time to roll."""
 
 
-def ring_of(count: int, joints: int = 12) -> tuple[list[ArmFrames], BodyFrame]:
+def ring_of(count: int, joints: int = 12) -> tuple[list[ArmFrames], Floats]:
     skeleton, arms, body = body_with_arms(count, joints)
-    return [frames_of_arm(skeleton, arm.bones, body) for arm in arms], body
+    bones = [arm.bones for arm in arms]
+    return [frames_of_arm(skeleton, each, body) for each in bones], arm_azimuths(
+        skeleton, bones, body
+    )
 
 
-def of_unlike_arms() -> tuple[list[ArmFrames], BodyFrame]:
+def of_unlike_arms() -> tuple[list[ArmFrames], Floats]:
     """Eight arms, every other of fewer bones."""
-    (long, body), (short, _) = ring_of(8, 12), ring_of(8, 5)
-    return [pair[number % 2] for number, pair in enumerate(zip(long, short, strict=True))], body
+    (long, azimuths), (short, _) = ring_of(8, 12), ring_of(8, 5)
+    return [pair[number % 2] for number, pair in enumerate(zip(long, short, strict=True))], azimuths
 
 
 def at_rest(arms: list[ArmFrames]) -> tuple[Floats, Floats]:
@@ -56,8 +59,8 @@ def standing(arms: list[ArmFrames], rotations: Floats, strains: Floats) -> tuple
 
 @pytest.mark.parametrize("unlike", [False, True], ids=["alike", "unlike"])
 def test_nothing_rolls_at_rest(unlike: bool) -> None:  # noqa: FBT001
-    arms, body = of_unlike_arms() if unlike else ring_of(8)
-    ring = ArmRing.of(arms, body)
+    arms, azimuths = of_unlike_arms() if unlike else ring_of(8)
+    ring = ArmRing.of(arms, azimuths)
     assert ring is not None
     rotations, strains = at_rest(arms)
     np.testing.assert_allclose(ring.rolled(rotations, strains, SLOW), rotations, atol=1e-12)
@@ -69,8 +72,8 @@ def test_joints_stay_and_so_does_all_beyond_half_of_an_arm(
     size: float,
     unlike: bool,  # noqa: FBT001
 ) -> None:
-    arms, body = of_unlike_arms() if unlike else ring_of(8)
-    ring = ArmRing.of(arms, body)
+    arms, azimuths = of_unlike_arms() if unlike else ring_of(8)
+    ring = ArmRing.of(arms, azimuths)
     assert ring is not None
     rotations, strains = swung(arms, seed, size)
     before, joints = standing(arms, rotations, strains)
@@ -98,8 +101,8 @@ def between(arms: list[ArmFrames], number: int, rotations: Floats) -> float:
 
 
 def test_an_arm_between_one_above_and_one_below_turns_its_side_to_them() -> None:
-    arms, body = ring_of(8)
-    ring = ArmRing.of(arms, body)
+    arms, azimuths = ring_of(8)
+    ring = ArmRing.of(arms, azimuths)
     assert ring is not None
     rotations, strains = at_rest(arms)
     for number, sign in ((2, 1.0), (4, -1.0)):
@@ -117,13 +120,13 @@ def test_an_arm_between_one_above_and_one_below_turns_its_side_to_them() -> None
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_few_arms_stand_beside_none(count: int) -> None:
-    arms, body = ring_of(count)
-    assert ArmRing.of(arms, body) is None
+    arms, azimuths = ring_of(count)
+    assert ArmRing.of(arms, azimuths) is None
 
 
 def test_arms_in_a_hurry_do_not_roll() -> None:
-    arms, body = ring_of(8)
-    ring = ArmRing.of(arms, body)
+    arms, azimuths = ring_of(8)
+    ring = ArmRing.of(arms, azimuths)
     assert ring is not None
     rotations, strains = swung(arms, 1, 0.8)
     assert ring.rolled(rotations, strains, 0.8) is rotations
@@ -135,13 +138,13 @@ def test_arms_in_a_hurry_do_not_roll() -> None:
 
 @given(st.integers(0, 10_000))
 def test_it_does_not_matter_how_a_rig_s_bones_are_rolled(seed: int) -> None:
-    plain, body = ring_of(8)
+    plain, azimuths = ring_of(8)
     rotations, strains = swung(plain, seed, 0.6)
     wanted = standing(plain, rotations, strains)[0].reshape(MOMENTS, 8, 12, 4)
     found = [wanted.reshape(MOMENTS, 96, 4)]
-    skeleton, listed, _ = body_with_arms(8, 12, rolls=np.random.default_rng(seed))
+    skeleton, listed, body = body_with_arms(8, 12, rolls=np.random.default_rng(seed))
     for arms in (plain, [frames_of_arm(skeleton, arm.bones, body) for arm in listed]):
-        ring = ArmRing.of(arms, body)
+        ring = ArmRing.of(arms, azimuths)
         assert ring is not None
         bones = [arm.to_bones(wanted[:, number]) for number, arm in enumerate(arms)]
         rolled = ring.rolled(np.concatenate(bones, axis=1), strains, SLOW)
