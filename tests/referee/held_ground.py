@@ -143,13 +143,20 @@ def _looked_at(
     depths = np.zeros((moments, len(recording.names)))
     columns = np.full(len(recording.names), -1)
     columns[rows] = np.arange(len(rows))
+    far_off = [_FarOff(skin.points.shape[1]) for skin in recording.skins]
     for moment in range(moments):
         tree = ground.tree(moment)
-        for skin in recording.skins:
+        for skin, far in zip(recording.skins, far_off, strict=True):
             step = slice(None, None, _SOME if moment % _DEPTHS else 1)
-            of_arms = columns[skin.bones[step]] >= 0
-            places, bones = skin.points[moment][step][of_arms], skin.bones[step][of_arms]
+            picked = np.arange(len(skin.bones))[step]
+            picked = picked[columns[skin.bones[picked]] >= 0]
+            if not ground.moves:
+                picked = picked[far.may_be_within(NEAR * length, picked, skin.points[moment])]
+            places, bones = skin.points[moment][picked], skin.bones[picked]
             found = [tree.find_nearest(place, _FAR * length) for place in places.tolist()]
+            far.seen(
+                picked, places, [_FAR * length if each[3] is None else each[3] for each in found]
+            )
             near = np.array([each[2] is not None for each in found], bool)
             if not near.any():
                 continue
@@ -157,6 +164,8 @@ def _looked_at(
             face = np.array([each[2] for each in found if each[2] is not None])
             apart = np.array([each[3] for each in found if each[3] is not None])
             below = -ground.side * ground.above(moment, face, places[near])
+            # What is in the ground is to be seen each time, however deep it is.
+            far.apart[picked[near][below > 0.0]] = 0.0
             np.maximum.at(depths[moment], bones, below)
             # The nearest of each bone's skin comes last, and so is the one that stays.
             last = np.argsort(-apart, kind="stable")
@@ -164,6 +173,26 @@ def _looked_at(
             nearer = apart < gaps[moment, own]
             gaps[moment, own[nearer]], faces[moment, own[nearer]] = apart[nearer], face[nearer]
     return gaps, faces, depths
+
+
+class _FarOff:
+    """Skin that was so far from ground which stays that it can't have come near meanwhile: it is
+    not looked for anew.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.apart = np.zeros(count)
+        """(points,) metres from the ground when they were looked for last …"""
+        self.places = np.zeros((count, 3))
+        """… and where (points, 3) they were then."""
+
+    def may_be_within(self, distance: float, picked: Integers, points: Floats) -> Flags:
+        """Which of those picked may be nearer than this."""
+        way = np.linalg.norm(points[picked] - self.places[picked], axis=1)
+        return self.apart[picked] - way <= distance
+
+    def seen(self, picked: Integers, places: Floats, apart: Sequence[float]) -> None:
+        self.places[picked], self.apart[picked] = places, apart
 
 
 def _runs(flags: Flags) -> list[tuple[int, int]]:

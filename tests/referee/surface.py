@@ -21,8 +21,9 @@ _AT_ONCE = 1 << 20
 class Surface:
     """Triangles, sorted into cells of the map."""
 
-    triangles: Floats
-    """(triangles, 3, 3), metres."""
+    planes: Floats
+    """(9, triangles) of corners a, b, c, with u = b − a and v = c − a: a on the map; what x and y
+    from there count in shares of u and of v; and heights of a, u and v. Metres."""
     low: Floats
     """(2,) the map's corner."""
     cell: float
@@ -52,12 +53,13 @@ class Surface:
         area = np.abs(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
         floors = triangles[area > _UPRIGHT]
         low, high = floors[..., :2].min(axis=(0, 1)), floors[..., :2].max(axis=(0, 1))
-        extent = np.ptp(floors[..., :2], axis=1).max(axis=-1)
+        # As wide as most are narrow: beside each other on a cell of long treads were a dozen.
+        extent = np.ptp(floors[..., :2], axis=1).min(axis=-1)
         cell = float(max(np.median(extent), np.max(high - low) / 400.0))
         shape = (int((high[0] - low[0]) / cell) + 1, int((high[1] - low[1]) / cell) + 1)
         listed = _listed(floors, low, cell, shape)
         tops = np.where(listed >= 0, floors[listed].max(axis=-2)[..., 2], -np.inf)
-        return cls(floors, low, cell, shape, listed, tops.max(axis=-1), tree)
+        return cls(_planes(floors), low, cell, shape, listed, tops.max(axis=-1), tree)
 
     def near(self, points: Floats, height: float = 0.0) -> Flags:
         """Which points (…, 3) may be less than so high over the ground: a quick look."""
@@ -80,13 +82,11 @@ class Surface:
         for column in self.listed.T:
             numbers = column[cells]
             some = np.flatnonzero(inside & (numbers >= 0))
-            a, b, c = np.moveaxis(self.triangles[numbers[some]], 1, 0)
-            u, v, w = b - a, c - a, flat[some] - a
-            area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-            s = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / area
-            t = (u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]) / area
+            a_x, a_y, s_x, s_y, t_x, t_y, a_z, u_z, v_z = self.planes[:, numbers[some]]
+            x, y = flat[some, 0] - a_x, flat[some, 1] - a_y
+            s, t = x * s_x + y * s_y, x * t_x + y * t_y
             over = (s >= -1e-9) & (t >= -1e-9) & (s + t <= 1.0 + 1e-9)
-            z = a[:, 2] + s * u[:, 2] + t * v[:, 2]
+            z = a_z + s * u_z + t * v_z
             rows = some[over]
             heights[rows] = np.maximum(heights[rows], z[over])
         return heights
@@ -111,6 +111,13 @@ class Surface:
         places = np.floor((points[..., :2] - self.low) / self.cell).astype(int)
         inside = np.all((places >= 0) & (places < self.shape), axis=-1)
         return np.where(inside, places[..., 0] * self.shape[1] + places[..., 1], 0), inside
+
+
+def _planes(triangles: Floats) -> Floats:
+    a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+    shares = v[:, 1] / area, -v[:, 0] / area, -u[:, 1] / area, u[:, 0] / area
+    return np.stack([a[:, 0], a[:, 1], *shares, a[:, 2], u[:, 2], v[:, 2]])
 
 
 def _few(count: int) -> list[slice]:
