@@ -19,6 +19,8 @@ REPOSITORY = Path(__file__).resolve().parent.parent
 WITHOUT_BLENDER = {"core", "device"}
 UNDER_THE_OLDER = {*WITHOUT_BLENDER, "blender", "bench", "referee"}
 """Whose tests with the mark `one_blender` run under the older of two, where both run."""
+ONE_BLENDER = {"core"}
+"""Whose tests all have that mark: what never sees Blender is the same under each."""
 BESIDE_ANOTHER = "OCTO_MOTION_BESIDE_ANOTHER"
 """What `make test` sets where it tests two Blenders side by side."""
 LACKING_DATA = "lacking data"
@@ -69,7 +71,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     left = {
         each
         for each in items
-        if each.get_closest_marker("one_blender")
+        if (each.get_closest_marker("one_blender") or _layer(each.path) in ONE_BLENDER)
         and (_layer(each.path) in UNDER_THE_OLDER) == newer
     }
     items[:] = [each for each in items if each not in left]

@@ -13,6 +13,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.one_blender
+
 REPOSITORY = Path(__file__).resolve().parent.parent
 PAGES = [
     *(

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.one_blender
+
 REPOSITORY = Path(__file__).resolve().parent.parent
 SET_UP = REPOSITORY / ".ci"
 REQUIREMENTS = sorted(SET_UP.glob("requirements-*.txt"))

@@ -14,7 +14,10 @@ from octo_motion.command_line import commands
 CLIPS = Path(__file__).resolve().parent.parent.parent / "docs" / "examples" / "clips"
 
 # Blender's importer leaves the file open.
-pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
+pytestmark = [
+    pytest.mark.one_blender,
+    pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning"),
+]
 
 
 @pytest.fixture

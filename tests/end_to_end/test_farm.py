@@ -18,6 +18,8 @@ import pytest
 from octo_motion.command_line import bake, commands, outputs, records
 from octo_motion.core.errors import WriteError
 
+pytestmark = pytest.mark.one_blender
+
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
 RANGE = 'settings = { timing = "RANGE", frame_end = 6 }\n'
 SMALL = "octopus = { arms = 4, joints = 3, with_mesh = false }\n"

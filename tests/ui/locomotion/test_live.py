@@ -169,6 +169,7 @@ SLIDERS: list[tuple[str, Any]] = [
 ]
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize(("name", "value"), SLIDERS)
 def test_the_motion_follows_every_slider(octopus: Any, name: str, value: Any) -> None:
     before = motion(octopus)
@@ -191,6 +192,7 @@ GROUND: list[Callable[[Any], None]] = [
 ]
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("number", range(len(GROUND)))
 def test_what_is_made_live_is_what_the_button_makes(octopus: Any, number: int) -> None:
     settings_of(octopus).timing = "CADENCE"
@@ -210,6 +212,7 @@ def sloping(armature: Any) -> None:
     settings_of(armature).ground.object = ground
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("setup", ["swim", "idle"])
 def test_what_swims_or_rests_over_ground_is_live_what_the_button_makes(
     octopus: Any, setup: str
@@ -374,6 +377,7 @@ def test_what_is_wrong_is_told_in_the_panel_and_the_motion_stays(octopus: Any) -
     assert motion(octopus) != before
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("frame", [1, 12])
 def test_an_action_that_is_edited_while_its_route_is_dragged_is_left_alone(
     octopus: Any, frame: int
@@ -460,6 +464,7 @@ def seen(armature: Any) -> dict[str, np.ndarray]:
     }
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("frame", [1, 83, 180])
 def test_the_frame_in_sight_is_there_before_all_others(octopus: Any, frame: int) -> None:
     settings_of(octopus).frame_end = 160
@@ -519,6 +524,7 @@ NEARLY: list[tuple[str, Any]] = [
 ]
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize(("name", "value"), NEARLY)
 def test_a_slider_is_followed_nearly_at_once(octopus: Any, name: str, value: Any) -> None:
     settings_of(octopus).frame_end = 160
@@ -569,6 +575,7 @@ def test_what_follows_is_worked_out_in_many_steps(octopus: Any) -> None:
     assert poses > 15 * len(job.creature.arms)
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize(
     ("shift", "samples"),
     [((0.3, 0.1, 0.0), 0), ((0.0, 0.0, 0.2), 0), (None, 1), ((3.0, 0.0, 0.0), 1)],

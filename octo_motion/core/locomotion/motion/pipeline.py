@@ -355,14 +355,14 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     volume = _volume_at(plan, times, keyed, swimming)
     yield 0.94
     # What is reached for is in the world.
-    reached = None
+    reached, gait = None, (arms.rotations.copy(), arms.strains.copy())
     if plan.carry is None:
         reached = yield from scaled(_reaching(plan, arms, volume, keyed, going), 0.94, 0.94)
     yield 0.96
     separate = partial(_separate, plan, arms, reached, going, volume, swimming=swimming)
     making_way = _making_way(plan, arms, reached, going, separate, cyclic=cyclic)
     warnings, turning = yield from scaled(making_way, 0.96, 0.98)
-    rolled = beside_neighbours(plan, arms)
+    rolled = beside_neighbours(plan, arms, gait)
     if rolled is not arms.rotations:
         arms.rotations, turning = rolled, None
     yield 0.98
@@ -385,14 +385,20 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     return _Posed(travel.phase, *shown)
 
 
-def beside_neighbours(plan: MotionPlan, arms: ArmMotion) -> Floats:
-    """Rotations (moments, bones, 4) of arms that roll towards their neighbours."""
+def beside_neighbours(
+    plan: MotionPlan, arms: ArmMotion, gait: tuple[Floats, Floats] | None = None
+) -> Floats:
+    """Rotations (moments, bones, 4) of arms that roll towards their neighbours.
+
+    These are where their gait has them, by rotations (moments, bones, 4) and strains (moments,
+    bones), if that is given: beside one that reaches, the others walk on as they do without.
+    """
     creature = plan.job.creature
     ring = ring_of_arms(creature.skeleton, creature.arms, creature.body)
     if ring is None:
         return arms.rotations
     cycle = plan.pace.fastest / plan.job.timing.rate
-    return ring.rolled(arms.rotations, arms.strains, cycle)
+    return ring.rolled(arms.rotations, arms.strains, cycle, neighbours=gait)
 
 
 def _body_of(creature: Creature, going: Travelled) -> Travelled:

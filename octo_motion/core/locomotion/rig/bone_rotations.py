@@ -574,19 +574,21 @@ class _Roots:
     places: np.ndarray
     """(bones, arms) among the bones of all arms."""
 
-    def standing(self, rotations: Floats, strains: Floats) -> tuple[Floats, Floats]:
-        """Orientations (4, bones · arms, moments) and joints (3, (bones + 1) · arms, moments),
-        armature space, of rotations (moments, bones, 4) and strains (moments, bones) of all arms.
+    def turned(self, rotations: Floats) -> Floats:
+        """Orientations (bones, 4, arms, moments), armature space, of rotations (moments, bones, 4)
+        of all arms.
         """
-        (bones, arms), moments = self.places.shape, len(rotations)
         own = rotations.transpose(1, 2, 0)[self.places].swapaxes(1, 2)
-        turned = self.batch.orientations(own, EACH_ARM)
+        return self.batch.orientations(own, EACH_ARM)
+
+    def joints(self, turned: Floats, strains: Floats) -> Floats:
+        """Joints (3, (bones + 1) · arms, moments), armature space, of orientations (bones, 4, arms,
+        moments) and strains (moments, bones) of all arms.
+        """
+        bones, _, arms, moments = turned.shape
         longer = strains.T[self.places].reshape(bones, -1)
         joints = self.batch.joints(turned.reshape(bones, 4, -1), self._arm(moments), longer)
-        return (
-            turned.swapaxes(0, 1).reshape(4, bones * arms, moments),
-            joints.swapaxes(0, 1).reshape(3, (bones + 1) * arms, moments),
-        )
+        return joints.swapaxes(0, 1).reshape(3, (bones + 1) * arms, moments)
 
     def rotations(self, orientations: Floats) -> Floats:
         """Rotations (moments, bones, arms, 4) of orientations (4, bones · arms, moments)."""
@@ -675,12 +677,22 @@ class ArmRing:
             apart=np.where(sure, apart, np.inf)[:, None],
         )
 
-    def _standing(self, rotations: Floats, strains: Floats) -> tuple[Floats, Floats]:
+    def _standing(
+        self, rotations: Floats, strains: Floats, neighbours: tuple[Floats, Floats] | None = None
+    ) -> tuple[Floats, Floats]:
         """Orientations (4, bones, moments), armature space, and the lines (3, bones, moments) from
-        the neighbour before to the one after beside each bone, in its own frame.
+        the neighbour before to the one after beside each bone, in its own frame; these may have
+        other rotations and strains.
         """
-        found = [each.standing(rotations, strains) for each in self.roots]
-        turned, joints = (np.concatenate(each, axis=1) for each in zip(*found, strict=True))
+        turned = [each.turned(rotations) for each in self.roots]
+        beside, longer = turned, strains
+        if neighbours is not None:
+            beside, longer = [each.turned(neighbours[0]) for each in self.roots], neighbours[1]
+        there = zip(self.roots, beside, strict=True)
+        joints = np.concatenate([each.joints(own, longer) for each, own in there], axis=1)
+        turned = np.concatenate(
+            [own.swapaxes(0, 1).reshape(4, -1, own.shape[-1]) for own in turned], axis=1
+        )
         before, after = (
             joints[:, first] + part * (joints[:, second] - joints[:, first])
             for (first, second), part in zip(self.beside, self.part, strict=True)
@@ -689,16 +701,24 @@ class ArmRing:
         line = components_first.rotate(back, (after - before).reshape(3, -1))
         return turned, line.reshape(before.shape)
 
-    def rolled(self, rotations: Floats, strains: Floats, cycle: float) -> Floats:
+    def rolled(
+        self,
+        rotations: Floats,
+        strains: Floats,
+        cycle: float,
+        *,
+        neighbours: tuple[Floats, Floats] | None = None,
+    ) -> Floats:
         """Rotations (moments, bones, 4) of all bones of all arms, one after the other, in their
         rest frames, of arms that roll; they are longer than at rest by strains (moments, bones),
-        and go through a cycle in so many seconds.
+        and go through a cycle in so many seconds. Their neighbours are as they are, or as other
+        rotations and strains have them.
         """
         from_seconds, to_seconds = _IN_TIME
         time = smooth_step(np.asarray((cycle - from_seconds) / (to_seconds - from_seconds)))
         if time <= 0.0:
             return rotations
-        turned, line = self._standing(rotations, strains)
+        turned, line = self._standing(rotations, strains, neighbours)
         along, side, square = self.axes
         side, square = (np.einsum("cb,cbm->bm", each, line) for each in (side, square))
         told = np.minimum(np.hypot(side, square) / (_NEAR * self.apart), 1.0)

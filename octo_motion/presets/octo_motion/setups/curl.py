@@ -9,7 +9,7 @@ settings = armature.octo_motion.locomotion
 settings.travel_on = "NONE"
 settings.gait = "curl"
 # Nobody goes anywhere: what rests on the ground stays where it is.
-settings.table.stride = 0.01
+settings.table.stride = 0.001
 settings.cycle_time = 6.0
 settings.breathing = 0.06
 settings.breath_time = 3.0

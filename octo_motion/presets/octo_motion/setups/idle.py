@@ -9,7 +9,7 @@ settings = armature.octo_motion.locomotion
 settings.travel_on = "NONE"
 settings.gait = "idle"
 # Nobody goes anywhere: what rests on the ground stays where it is.
-settings.table.stride = 0.01
+settings.table.stride = 0.001
 settings.cycle_time = 5.0
 settings.ground.duty = 0.55
 settings.breathing = 0.09

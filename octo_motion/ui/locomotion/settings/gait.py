@@ -203,7 +203,7 @@ class OCTO_MOTION_PG_gait_table(bpy.types.PropertyGroup):
         description="How far the body travels in one cycle, in arm lengths. A longer stride "
         "covers the route in fewer cycles",
         default=_DEFAULT.stride,
-        min=0.01,
+        min=0.001,
         soft_min=0.1,
         soft_max=3.0,
         step=5,
