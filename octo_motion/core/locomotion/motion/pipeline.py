@@ -390,15 +390,15 @@ def beside_neighbours(
 ) -> Floats:
     """Rotations (moments, bones, 4) of arms that roll towards their neighbours.
 
-    These are where their gait has them, by rotations (moments, bones, 4) and strains (moments,
-    bones), if that is given: beside one that reaches, the others walk on as they do without.
+    They do so as their gait has them, by rotations (moments, bones, 4) and strains (moments,
+    bones), if that is given: what reaches turns no faster for it, and beside it others walk on.
     """
     creature = plan.job.creature
     ring = ring_of_arms(creature.skeleton, creature.arms, creature.body)
     if ring is None:
         return arms.rotations
     cycle = plan.pace.fastest / plan.job.timing.rate
-    return ring.rolled(arms.rotations, arms.strains, cycle, neighbours=gait)
+    return ring.rolled(arms.rotations, arms.strains, cycle, gait=gait)
 
 
 def _body_of(creature: Creature, going: Travelled) -> Travelled:

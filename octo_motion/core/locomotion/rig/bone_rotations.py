@@ -677,22 +677,14 @@ class ArmRing:
             apart=np.where(sure, apart, np.inf)[:, None],
         )
 
-    def _standing(
-        self, rotations: Floats, strains: Floats, neighbours: tuple[Floats, Floats] | None = None
-    ) -> tuple[Floats, Floats]:
+    def _standing(self, rotations: Floats, strains: Floats) -> tuple[Floats, Floats]:
         """Orientations (4, bones, moments), armature space, and the lines (3, bones, moments) from
-        the neighbour before to the one after beside each bone, in its own frame; these may have
-        other rotations and strains.
+        the neighbour before to the one after beside each bone, in its own frame.
         """
         turned = [each.turned(rotations) for each in self.roots]
-        beside, longer = turned, strains
-        if neighbours is not None:
-            beside, longer = [each.turned(neighbours[0]) for each in self.roots], neighbours[1]
-        there = zip(self.roots, beside, strict=True)
-        joints = np.concatenate([each.joints(own, longer) for each, own in there], axis=1)
-        turned = np.concatenate(
-            [own.swapaxes(0, 1).reshape(4, -1, own.shape[-1]) for own in turned], axis=1
-        )
+        there = zip(self.roots, turned, strict=True)
+        joints = np.concatenate([each.joints(own, strains) for each, own in there], axis=1)
+        turned = _flat(turned)
         before, after = (
             joints[:, first] + part * (joints[:, second] - joints[:, first])
             for (first, second), part in zip(self.beside, self.part, strict=True)
@@ -707,18 +699,20 @@ class ArmRing:
         strains: Floats,
         cycle: float,
         *,
-        neighbours: tuple[Floats, Floats] | None = None,
+        gait: tuple[Floats, Floats] | None = None,
     ) -> Floats:
         """Rotations (moments, bones, 4) of all bones of all arms, one after the other, in their
         rest frames, of arms that roll; they are longer than at rest by strains (moments, bones),
-        and go through a cycle in so many seconds. Their neighbours are as they are, or as other
-        rotations and strains have them.
+        and go through a cycle in so many seconds. They roll as they would with the rotations and
+        strains of their gait, if these are others.
         """
         from_seconds, to_seconds = _IN_TIME
         time = smooth_step(np.asarray((cycle - from_seconds) / (to_seconds - from_seconds)))
         if time <= 0.0:
             return rotations
-        turned, line = self._standing(rotations, strains, neighbours)
+        turned, line = self._standing(*(gait or (rotations, strains)))
+        if gait is not None:
+            turned = _flat([each.turned(rotations) for each in self.roots])
         along, side, square = self.axes
         side, square = (np.einsum("cb,cbm->bm", each, line) for each in (side, square))
         told = np.minimum(np.hypot(side, square) / (_NEAR * self.apart), 1.0)
@@ -732,6 +726,11 @@ class ArmRing:
             result[:, each.places] = each.rotations(turned[:, part])
             start = part.stop
         return result
+
+
+def _flat(turned: Sequence[Floats]) -> Floats:
+    """(4, bones, moments) of (bones, 4, arms, moments) each."""
+    return np.concatenate([own.swapaxes(0, 1).reshape(4, -1, own.shape[-1]) for own in turned], 1)
 
 
 def _neighbours(azimuths: Floats) -> dict[int, tuple[int, int]]:
