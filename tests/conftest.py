@@ -17,7 +17,14 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 WITHOUT_BLENDER = {"core", "device"}
-UNDER_THE_OLDER = {*WITHOUT_BLENDER, "blender", "bench", "referee"}
+OLDER_ROOMS = ("posing", "splicing", "follow_through")
+UNDER_THE_OLDER = {
+    *WITHOUT_BLENDER,
+    "blender",
+    "bench",
+    "referee",
+    *(f"ui/{r}" for r in OLDER_ROOMS),
+}
 """Whose tests with the mark `one_blender` run under the older of two, where both run."""
 ONE_BLENDER = {"core"}
 """Whose tests all have that mark: what never sees Blender is the same under each."""
@@ -72,7 +79,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         each
         for each in items
         if (each.get_closest_marker("one_blender") or _layer(each.path) in ONE_BLENDER)
-        and (_layer(each.path) in UNDER_THE_OLDER) == newer
+        and (not UNDER_THE_OLDER.isdisjoint(_folders(each.path))) == newer
     }
     items[:] = [each for each in items if each not in left]
     config.hook.pytest_deselected(items=list(left))
@@ -80,6 +87,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def _layer(path: Path) -> str:
     return path.relative_to(REPOSITORY / "tests").parts[0]
+
+
+def _folders(path: Path) -> set[str]:
+    """`core`, or `ui` and `ui/posing`: every folder of the tests that the file lies in."""
+    inside = path.relative_to(REPOSITORY / "tests").parts
+    return {"/".join(inside[: k + 1]) for k in range(len(inside))}
 
 
 def pytest_report_teststatus(report: pytest.TestReport) -> tuple[str, str, str] | None:

@@ -155,6 +155,7 @@ def test_an_action_that_lies_in_the_one_strip_of_the_nla_is_followed() -> None:
     np.testing.assert_allclose(played(fox), expected, atol=1e-6)
 
 
+@pytest.mark.one_blender
 def test_a_strip_that_is_there_now_is_followed_and_not_the_action_of_before() -> None:
     fox = make_fox()
     select_tail(fox)
@@ -183,6 +184,7 @@ def test_a_motion_in_several_strips_is_told_and_left_alone() -> None:
     assert len(bpy.data.actions) == 1
 
 
+@pytest.mark.one_blender
 def test_new_action_has_the_rest_of_the_old_one_and_the_same_action_takes_it_in() -> None:
     fox = make_fox()
     select_tail(fox)
@@ -247,6 +249,7 @@ def test_cycle_meets_its_beginning() -> None:
     assert follow_settings(fox).result.use_cyclic
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("last", [FRAMES, FRAMES - 4])
 def test_loop_that_nothing_marks_as_one_meets_its_beginning(last: int) -> None:
     """Clips from files: whether they are loops is seen from their ends alone."""
@@ -300,6 +303,7 @@ def test_chains_are_found_by_their_names_listed_and_told_apart() -> None:
     assert len(bpy.context.selected_pose_bones) == 5
 
 
+@pytest.mark.one_blender
 def test_floor_stops_a_limp_tail() -> None:
     fox = make_fox()
     select_tail(fox)

@@ -12,6 +12,8 @@ from octo_motion.core.locomotion.ground.walk import Foothold
 from tests.ui.made import prepare
 from tests.ui.rig import Octopus, generate, give_route, joints_in_world, keys
 
+pytestmark = pytest.mark.one_blender
+
 WAY = {"b0": (-0.4, 0.1, 0.0), "b1": (0.0, -0.2, 0.0), "b2": (0.4, 0.2, 0.0), "b3": (0.8, 0.0, 0.0)}
 OCTOPUS = Octopus(add_on=True, with_mesh=False, route=WAY, settings={"keep_apart": False})
 

@@ -10,6 +10,8 @@ import pytest
 from tests.ui.made import Made, prepare
 from tests.ui.rig import Octopus
 
+pytestmark = pytest.mark.one_blender
+
 OCTOPUS = Octopus(add_on=True, route={}, settings={"gait": "crawl"})
 """The default octopus that crawls along the default route."""
 

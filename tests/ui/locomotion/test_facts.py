@@ -15,6 +15,8 @@ import pytest
 from tests.ui.made import prepare
 from tests.ui.rig import Octopus, generate, still
 
+pytestmark = pytest.mark.one_blender
+
 OCTOPUS = Octopus(add_on=True, with_mesh=False)
 STRAIGHT = {"b0": (0, 0, 0), "b1": (0, -1, 0), "b2": (0, -2, 0), "b3": (0, -4, 0)}
 

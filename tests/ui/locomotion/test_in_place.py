@@ -14,6 +14,8 @@ from octo_motion.core.locomotion.path.travel import plan_travel
 from tests.ui.made import prepare
 from tests.ui.rig import Octopus, curves, generate, joints_in_world, keys, still
 
+pytestmark = pytest.mark.one_blender
+
 OCTOPUS = Octopus(settings={"travel_on": "NONE", "cycle_time": 1.0})
 """It has no route."""
 

@@ -15,6 +15,8 @@ from octo_motion.ui.locomotion.writing import shot as workflow
 from tests.ui.locomotion.test_generate_on_rigs import opened
 from tests.ui.rig import Octopus, click, generate, joints_in_world
 
+pytestmark = pytest.mark.one_blender
+
 WAY = ((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, -1.6, 0.0), (0.6, -2.0, 0.3))
 OCTOPUS = Octopus(
     add_on=True, with_mesh=False, route=WAY, frames=24, settings={"tell_overlaps": False}

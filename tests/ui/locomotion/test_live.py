@@ -103,6 +103,7 @@ def test_the_motion_follows_a_point_of_the_route(octopus: Any) -> None:
     assert motion(octopus) == followed  # as Generate makes it
 
 
+@pytest.mark.one_blender
 def test_pythons_collector_leaves_alone_what_is_there_while_anything_is_live(octopus: Any) -> None:
     """It looked through all of Blender's scripts in the middle of a drag, for 60 ms."""
     assert gc.get_freeze_count() > 10_000
@@ -129,6 +130,7 @@ def test_another_set_up_is_followed_and_live_stays_on(octopus: Any) -> None:
     assert motion(octopus) != before
 
 
+@pytest.mark.one_blender
 def test_a_route_in_edit_mode_is_followed_as_it_is(octopus: Any) -> None:
     """A drag is applied to what is edited, which the rest of Blender does not see yet."""
     route = settings_of(octopus).route
@@ -228,6 +230,7 @@ def test_what_swims_or_rests_over_ground_is_live_what_the_button_makes(
     assert motion(octopus) == followed != level
 
 
+@pytest.mark.one_blender
 def test_a_bend_that_gets_tight_is_live_what_the_button_makes(octopus: Any) -> None:
     points = settings_of(octopus).route.data.splines[0].bezier_points
     points[0].handle_right, points[1].handle_left = (0.0, -4.0, 0.0), (-0.5, -4.0, 0.5)
@@ -243,6 +246,7 @@ def test_a_bend_that_gets_tight_is_live_what_the_button_makes(octopus: Any) -> N
     assert motion(octopus) == less != followed
 
 
+@pytest.mark.one_blender
 def test_what_changes_along_with_a_dragged_route_counts_too(octopus: Any) -> None:
     settings_of(octopus).ground.object = make_square(20.0)
     settle()
@@ -271,6 +275,7 @@ def test_what_changes_along_with_a_dragged_route_counts_too(octopus: Any) -> Non
     assert is_what_the_button_makes()
 
 
+@pytest.mark.one_blender
 def test_the_motion_follows_its_ground(octopus: Any) -> None:
     ground = make_square(20.0)
     settings_of(octopus).ground.object = ground
@@ -445,6 +450,7 @@ def test_an_action_of_the_artists_own_is_left_alone(octopus: Any) -> None:
     assert not settings_of(octopus).live
 
 
+@pytest.mark.one_blender
 def test_few_keys_follow_when_a_key_on_every_frame_is_there(octopus: Any) -> None:
     settings_of(octopus).keys = "REDUCED"
     drag_route(octopus)
@@ -642,6 +648,7 @@ def as_written(armature: Any) -> tuple[str, Any]:
     return name, work
 
 
+@pytest.mark.one_blender
 def test_keys_come_a_few_curves_at_a_time_and_none_is_seen_before_all(slowly: Any) -> None:
     drag_route(slowly)
     bpy.context.view_layer.update()
@@ -690,11 +697,13 @@ def assert_given_back(armature: Any, before: dict[Any, Any]) -> None:
     assert not actions.is_edited(action_of(armature))
 
 
+@pytest.mark.one_blender
 def test_an_action_that_is_half_written_is_given_back(slowly: Any) -> None:
     before = half_written(slowly)
     assert_given_back(slowly, before)
 
 
+@pytest.mark.one_blender
 def test_an_action_that_is_half_written_is_given_back_where_the_next_one_cannot_be(
     slowly: Any,
 ) -> None:
@@ -719,6 +728,7 @@ def all_but_written(armature: Any) -> Any:
     return action
 
 
+@pytest.mark.one_blender
 def test_a_frame_range_that_came_with_half_written_keys_is_given_back(slowly: Any) -> None:
     settings, before, keys = settings_of(slowly), frame_range(slowly), motion(slowly)
     settings.frame_start, settings.frame_end = 11, settings.frame_end + 10
@@ -736,6 +746,7 @@ def frame_range(armature: Any) -> tuple[float, float]:
     return tuple(action_of(armature).frame_range)
 
 
+@pytest.mark.one_blender
 def test_a_curve_muted_on_the_last_step_stays_so_and_the_action_is_the_artists(slowly: Any) -> None:
     drag_route(slowly)
     action = all_but_written(slowly)
@@ -760,6 +771,7 @@ def stiff(slowly: Any) -> Any:
     return slowly
 
 
+@pytest.mark.one_blender
 def test_curves_that_come_new_come_with_the_first_that_is_seen_and_no_more_is_left_to_the_end(
     stiff: Any,
 ) -> None:
@@ -787,6 +799,7 @@ def test_curves_that_come_new_come_with_the_first_that_is_seen_and_no_more_is_le
     assert motion(stiff) == followed
 
 
+@pytest.mark.one_blender
 def test_curves_that_came_new_go_again_where_the_action_is_given_back(stiff: Any) -> None:
     before = motion(stiff)
     all_but_written(stiff)
@@ -794,6 +807,7 @@ def test_curves_that_came_new_go_again_where_the_action_is_given_back(stiff: Any
     assert_given_back(stiff, before)
 
 
+@pytest.mark.one_blender
 def test_bones_that_come_to_pass_their_scale_on_otherwise_are_followed(octopus: Any) -> None:
     def aligned(*, stretched: bool) -> bool:
         for bone in octopus.data.bones:
@@ -826,6 +840,7 @@ def few_on_their_way(armature: Any) -> dict[Any, Any]:
     return dense
 
 
+@pytest.mark.one_blender
 def test_few_keys_come_a_few_curves_at_a_time_too(slowly: Any) -> None:
     few_on_their_way(slowly)
     most, turns = 4 * actions.CHANNELS_AT_ONCE, 0
@@ -858,6 +873,7 @@ def few(slowly: Any) -> Any:
     return slowly
 
 
+@pytest.mark.one_blender
 def test_few_keys_become_many_a_few_curves_at_a_time_and_the_frame_in_sight_stays_as_it_is_shown(
     few: Any,
 ) -> None:
@@ -887,6 +903,7 @@ def test_few_keys_become_many_a_few_curves_at_a_time_and_the_frame_in_sight_stay
     assert motion(few) == followed
 
 
+@pytest.mark.one_blender
 def test_few_keys_that_have_begun_to_become_many_are_given_back(few: Any) -> None:
     before, here = motion(few), seen(few)
     half_written(few)
@@ -895,6 +912,7 @@ def test_few_keys_that_have_begun_to_become_many_are_given_back(few: Any) -> Non
     assert apart(seen(few), here) < 1e-6
 
 
+@pytest.mark.one_blender
 def test_few_keys_that_are_half_written_are_given_back(slowly: Any) -> None:
     dense = few_on_their_way(slowly)
     for _ in range(3):
@@ -903,6 +921,7 @@ def test_few_keys_that_are_half_written_are_given_back(slowly: Any) -> None:
     assert_given_back(slowly, dense)
 
 
+@pytest.mark.one_blender
 def test_a_drag_while_an_action_is_half_written_is_followed(slowly: Any) -> None:
     before = half_written(slowly)
     drag_route(slowly)
@@ -914,6 +933,7 @@ def test_a_drag_while_an_action_is_half_written_is_followed(slowly: Any) -> None
     assert motion(slowly) == followed
 
 
+@pytest.mark.one_blender
 def test_the_way_and_its_footholds_are_drawn_until_the_motion_is_there(octopus: Any) -> None:
     settings_of(octopus).ground.object = make_square(20.0)
     settle()
@@ -932,6 +952,7 @@ def test_the_way_and_its_footholds_are_drawn_until_the_motion_is_there(octopus: 
     assert not live._state.following
 
 
+@pytest.mark.one_blender
 def test_another_frame_is_shown_as_it_is_going_to_be(octopus: Any) -> None:
     settings_of(octopus).frame_end = 160
     settle()
@@ -974,6 +995,7 @@ def test_a_dragged_contact_is_followed(octopus: Any) -> None:
     assert not settle()
 
 
+@pytest.mark.one_blender
 def test_undo_leaves_route_and_motion_in_agreement(octopus: Any) -> None:
     name, route = octopus.name, settings_of(octopus).route.name
     bpy.ops.ed.undo_push(message="before")
@@ -996,6 +1018,7 @@ def test_undo_leaves_route_and_motion_in_agreement(octopus: Any) -> None:
     assert motion(bpy.data.objects[name]) == after
 
 
+@pytest.mark.one_blender
 def test_a_file_is_followed_after_it_is_opened(octopus: Any, tmp_path: Path) -> None:
     name, before = octopus.name, motion(octopus)
     drag_route(octopus)
@@ -1013,6 +1036,7 @@ def test_a_file_is_followed_after_it_is_opened(octopus: Any, tmp_path: Path) -> 
     assert motion(opened) != saved
 
 
+@pytest.mark.one_blender
 def test_two_octopuses_are_followed_each_for_itself(octopus: Any) -> None:
     other = make_octopus("Other")
     give_route(other)
@@ -1179,6 +1203,7 @@ def test_while_a_tool_has_the_screen_the_motion_waits(
     assert motion(octopus) != before
 
 
+@pytest.mark.one_blender
 def test_nothing_is_left_of_it_when_the_add_on_is_switched_off() -> None:
     script = (
         "import bpy, octo_motion\n"

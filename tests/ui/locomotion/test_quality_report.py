@@ -94,6 +94,7 @@ def test_the_figure_of_the_turn_is_what_blender_plays(octopus: Any) -> None:
     assert played.sample + 1 == figure.frame
 
 
+@pytest.mark.one_blender
 def test_the_figure_of_the_depth_is_what_blender_plays_between_frames(octopus: Any) -> None:
     """With few keys that may be far off an arm dives below the ground between two frames."""
     settings = octopus.octo_motion.locomotion
@@ -358,6 +359,7 @@ def measured_joints(measured: Measured, poses: Poses) -> np.ndarray:
     return np.stack(found, axis=1)
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("travel_on", ["OBJECT", "BONE"])
 @pytest.mark.parametrize("mode", ["QUATERNION", "ZXY", "AXIS_ANGLE"])
 def test_few_keys_are_measured_as_blender_plays_them(travel_on: str, mode: str) -> None:

@@ -12,6 +12,8 @@ from octo_motion.blender.animation.actions import is_edited
 from tests.core import objects
 from tests.ui.rig import Octopus, click, generate, give_route, joints_in_world, keys
 
+pytestmark = pytest.mark.one_blender
+
 WAY = ((0.0, 0.0, 0.0), (0.0, -0.1, 0.0), (0.0, -0.2, 0.0), (0.0, -0.3, 0.0))
 
 

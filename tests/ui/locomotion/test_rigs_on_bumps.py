@@ -15,6 +15,8 @@ from tests.ui.locomotion.test_generate_on_rigs import opened
 from tests.ui.made import prepare
 from tests.ui.rig import click
 
+pytestmark = pytest.mark.one_blender
+
 STIFF = (0.12, 0.34, 0.34, 0.2)
 """Lengths of four bones of which two are as good as all."""
 

@@ -19,6 +19,8 @@ from tests.ui.locomotion.test_generate_on_rigs import opened
 from tests.ui.made import prepare
 from tests.ui.rig import click, make_octopus
 
+pytestmark = pytest.mark.one_blender
+
 LEVEL = {"b0": (0, 0, 0), "b1": (0, -2, 0), "b2": (1, -4, 0), "b3": (1, -6, 0)}
 
 

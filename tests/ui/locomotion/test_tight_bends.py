@@ -11,6 +11,8 @@ from tests.referee import creature_measures as measures
 from tests.referee.recording import moments, record
 from tests.referee.scenes import Scene, build
 
+pytestmark = pytest.mark.one_blender
+
 HAIRPIN = np.array([[-0.6, 0.0, 0.0], [0.9, 0.0, 0.0], [0.9, 0.3, 0.0], [-0.6, 0.3, 0.0]])
 U_TURN = np.array([[-0.5, 0.0, 0.0], [0.7, -0.05, 0.0], [0.7, 0.65, 0.0], [-0.5, 0.6, 0.0]])
 LOOP = np.array([[-0.3, 0.0, 0.0], [1.2, 0.9, 0.0], [-1.2, 0.9, 0.0], [0.3, 0.0, 0.0]])
@@ -24,7 +26,6 @@ def figures(scene: Scene) -> dict[str, float]:
 
 # Without it: 1.7, 3.2, 3.7, 4.8 and 3.1 radii, and up to 400 pairs of faces through each other. At
 # their roots, where the skin folds, seven are so at most.
-@pytest.mark.one_blender
 @pytest.mark.parametrize(
     ("setup", "way", "turn"),
     [

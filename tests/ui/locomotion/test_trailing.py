@@ -5,9 +5,12 @@ from typing import Any
 
 import bpy
 import numpy as np
+import pytest
 
 from tests.ui.made import prepare
 from tests.ui.rig import Octopus, generate
+
+pytestmark = pytest.mark.one_blender
 
 OCTOPUS = Octopus(add_on=True)
 

@@ -9,6 +9,8 @@ import pytest
 
 from tests.ui.rig import Octopus, generate
 
+pytestmark = pytest.mark.one_blender
+
 OCTOPUS = Octopus(add_on=True, with_mesh=False)
 CYCLES, CYCLE = 3, 24  # frames a cycle
 

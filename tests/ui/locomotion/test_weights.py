@@ -10,6 +10,8 @@ import pytest
 from octo_motion.core.rotations import normalized
 from tests.ui.rig import Octopus, click, generate
 
+pytestmark = pytest.mark.one_blender
+
 FRAMES = range(1, 241, 4)
 
 

@@ -228,6 +228,7 @@ def test_another_frame_ends_measuring(controls: PoseControls) -> None:
 # --- In words ------------------------------------------------------------------------------------
 
 
+@pytest.mark.one_blender
 def test_joint_does_what_was_said_of_it(octopus: Any) -> None:
     asked = {"bends": np.radians(50.0), "stays": np.radians(30.0), "pull": 3.0, "seconds": 0.5}
     for strength in (1.0, 4.0):
@@ -339,6 +340,7 @@ def test_typed_coefficients_are_those_of_the_joint_whatever_the_strength(octopus
     assert bone_materials(octopus) == {}
 
 
+@pytest.mark.one_blender
 def test_joint_gives_way_about_each_axis_of_its_bone_as_it_was_typed(octopus: Any) -> None:
     bpy.ops.octo_motion.pose_coefficients(bone=BONE, **TYPED)
     session = PuppetSession(octopus, bpy.context.scene, clock=None)

@@ -262,6 +262,7 @@ def test_what_is_made_live_is_what_the_button_makes(
     assert not [each for each in names() if each.startswith(".")]
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("result_as", ["ACTION", "LAYER"])
 @pytest.mark.parametrize("interpolation", ["BEZIER", "SINE"])
 def test_few_keys_in_all_rotation_modes_are_those_of_the_button(
@@ -365,6 +366,7 @@ def test_another_frame_is_shown_as_it_is_going_to_be(hero: Any) -> None:
     assert apart(seen(hero), shown) < 1e-4
 
 
+@pytest.mark.one_blender
 def test_what_was_made_last_is_there_until_the_new_one_is_whole(hero: Any) -> None:
     stack = stack_of(hero)
     before, turns = all_of(stack.result), 0
@@ -399,6 +401,7 @@ def test_a_change_while_one_is_half_written_takes_its_place(hero: Any) -> None:
     assert names() == actions
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("what", ["purged", "keys of the base", "source"])
 def test_what_goes_while_one_is_half_written_does_no_harm(hero: Any, what: str) -> None:
     stack, actions = stack_of(hero), names()
@@ -457,6 +460,7 @@ def test_a_button_that_fails_leaves_what_was_on_its_way_to_be_made(hero: Any) ->
     assert as_built(hero) == live
 
 
+@pytest.mark.one_blender
 def test_two_bodies_of_one_source_are_followed_each_for_itself(hero: Any) -> None:
     source, clip = stack_of(hero).splices[0].source, stack_of(hero).splices[0].action
     other = make_humanoid("Other", scale=1.2)
@@ -729,6 +733,7 @@ def test_a_retarget_made_live_is_what_the_button_makes(
     assert result_of(walker).name == name
 
 
+@pytest.mark.one_blender
 def test_the_frame_in_sight_of_a_retarget_is_there_before_all_others(walker: Any) -> None:
     before, here = all_of(result_of(walker)), seen(walker)
     retarget_of(walker).travel = False
@@ -744,6 +749,7 @@ def test_the_frame_in_sight_of_a_retarget_is_there_before_all_others(walker: Any
     assert apart(there, here) > 0.2
 
 
+@pytest.mark.one_blender
 def test_the_clip_of_a_retarget_is_followed(walker: Any) -> None:
     clip, before = retarget_of(walker).from_action, all_of(result_of(walker))
     assert retarget_of(walker).from_armature.name == "Walker"
@@ -794,6 +800,7 @@ def test_a_retarget_whose_clip_is_gone_says_so(walker: Any) -> None:
     assert all_of(result_of(walker)) == before
 
 
+@pytest.mark.one_blender
 def test_splices_and_retarget_of_one_body_follow_each_for_itself(walker: Any) -> None:
     retargeted = result_of(walker)
     source = retarget_of(walker).from_armature

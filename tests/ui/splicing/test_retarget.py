@@ -63,6 +63,7 @@ def drifts(recording: Recording, body: Body, points: tuple[str, ...] = ("foot", 
     return most
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("name", BODIES)
 def test_feet_stand_where_their_clip_stands_and_on_the_ground(name: str) -> None:
     _, hero = walker_and(name)
@@ -86,6 +87,7 @@ def test_without_foot_lock_feet_of_another_body_slide() -> None:
     assert drifts(played(hero), BODIES["short legs, wide hips"]) > 0.005
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("name", BODIES)
 def test_strides_are_of_the_bodys_own_size(name: str) -> None:
     source, hero = walker_and(name)
@@ -98,6 +100,7 @@ def test_strides_are_of_the_bodys_own_size(name: str) -> None:
     assert np.abs(ways[1] - size * ways[0]).max() < 0.01 * np.linalg.norm(ways[1])
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("name", BODIES)
 def test_limbs_point_where_the_clips_do(name: str) -> None:
     source, hero = walker_and(name)
@@ -114,6 +117,7 @@ def test_limbs_point_where_the_clips_do(name: str) -> None:
             assert np.median(angle) < (2.0 if first.startswith("upper") else 4.0)
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("name", BODIES)
 def test_loops_stay_loops(name: str) -> None:
     _, hero = walker_and(name)
@@ -129,6 +133,7 @@ def test_loops_stay_loops(name: str) -> None:
     assert np.linalg.norm(speeds[0] - speeds[1], axis=-1)[deforming].max() < 1.2 * usual
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("name", BODIES)
 def test_nothing_pops(name: str) -> None:
     """What changes from frame to frame halves with the step."""
@@ -161,6 +166,7 @@ def lean_forward_at_rest(armature: Any, degrees: float) -> None:
         pose.keyframe_insert("location", frame=frame)
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("degrees", [20.0, 40.0, 60.0])
 def test_a_body_whose_rest_pose_leans_stands_as_its_clip_does(degrees: float) -> None:
     _, hero = walker_and("like it")

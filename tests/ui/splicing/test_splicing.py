@@ -223,6 +223,7 @@ def test_legs_can_be_seen_from_the_chest() -> None:
     assert apart[1] < 10 * ROUNDING
 
 
+@pytest.mark.one_blender
 def test_every_part_can_be_seen_from_elsewhere_and_is_seen_as_usual_unless_asked() -> None:
     hero, _ = hero_and_source()
     usual = {"RIGHT_ARM": "CHEST", "LEGS": "PELVIS", "HEAD": "CHEST", "TRUNK": "WORLD"}
@@ -545,6 +546,7 @@ def test_landmarks_of_the_table_count() -> None:
     assert changed == {"clavicle.L", "upper_arm.L", "forearm.L", "hand.L"}
 
 
+@pytest.mark.one_blender
 def test_an_arm_of_an_octopus_goes_onto_another_octopus() -> None:
     swimmer, walker = make_octopus("Swimmer"), make_octopus("Walker")
     swimmer.octo_motion.locomotion.gait = "swim"
@@ -797,6 +799,7 @@ def assert_same_pose(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -
         assert np.abs(matrix - other[name]).max() < ROUNDING, name
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize("part", ["RIGHT_ARM", "TRUNK", "LEGS"])
 @pytest.mark.parametrize("travel", [False, True])
 def test_while_dragging_the_body_is_posed_as_it_will_be(part: str, travel: bool) -> None:  # noqa: FBT001
@@ -950,6 +953,7 @@ def _a_chain_of_nothing(item: Any, _source: Any) -> None:
     item.part = "CHAIN"
 
 
+@pytest.mark.one_blender
 @pytest.mark.parametrize(
     ("spoil", "reason"),
     [
