@@ -94,7 +94,9 @@ _BORDER: Final = 1.6
 _EVEN_BORDER: Final = 0.2
 """… and how many more they are on even ground. Without, skin slides there by 0.0024 arm lengths in
 a hold of Walk instead of 0.0013. On steps, arms of Settle would be 0.0044 in the ground instead of
-0.0024."""
+0.0024 …"""
+_GOES_ON: Final = 0.02
+"""… if the body goes by as many arm lengths meanwhile. In place, roots of Idle fold with it."""
 _EASY: Final = 0.88
 """Share of its length between body and foothold from which on an arm stretches. At 0.44 all arms
 are stretched, by 0.39 even in Idle."""
@@ -592,7 +594,8 @@ def _knee(batch: Batch, stance: Stance, chord: Floats, longer: Floats) -> Floats
 
 def _freedom(batch: Batch, stance: Stance) -> Floats:
     """How far each segment (segments, batch) is free to turn: 0 where it lies on the ground."""
-    border = _BORDER + _EVEN_BORDER * (1.0 - _uneven(stance))
+    goes = smooth_step(stance.goes / (_GOES_ON * batch.reach[-1]))
+    border = _BORDER + _EVEN_BORDER * goes * (1.0 - _uneven(stance))
     return smooth_step((stance.contact_from - batch.reach[:-1]) / (border * batch.lengths))
 
 
