@@ -17,13 +17,9 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 WITHOUT_BLENDER = {"core", "device"}
-OLDER_ROOMS = ("posing", "splicing", "follow_through")
-UNDER_THE_OLDER = {
-    *WITHOUT_BLENDER,
-    "blender",
-    "bench",
-    "referee",
-    *(f"ui/{r}" for r in OLDER_ROOMS),
+UNDER_THE_OLDER = WITHOUT_BLENDER | {
+    *("blender", "bench", "referee"),
+    *("ui/posing", "ui/splicing", "ui/follow_through"),
 }
 """Whose tests with the mark `one_blender` run under the older of two, where both run."""
 ONE_BLENDER = {"core"}
