@@ -90,13 +90,7 @@ _FOLDED: Final = np.radians(110.0)
 has turned on itself is not definite. The default octopus' hardly come near."""
 _BORDER: Final = 1.6
 """Segments before the ground over which an arm is less and less free to turn. At 0.8 the jerk is
-0.093 …"""
-_EVEN_BORDER: Final = 0.2
-"""… and how many more they are on even ground. Without, skin slides there by 0.0024 arm lengths in
-a hold of Walk instead of 0.0013. On steps, arms of Settle would be 0.0044 in the ground instead of
-0.0024 …"""
-_GOES_ON: Final = 0.02
-"""… if the body goes by as many arm lengths meanwhile. In place, roots of Idle fold with it."""
+0.093."""
 _EASY: Final = 0.88
 """Share of its length between body and foothold from which on an arm stretches. At 0.44 all arms
 are stretched, by 0.39 even in Idle."""
@@ -155,15 +149,13 @@ _DRAGGED_OVER: Final = 0.15
 """… nor on even ground, which an arm leaves by itself: radians between upwards where it lies and on
 the whole from which on all of it comes. On any ground, arms of Walk on a slope touch at 13 % of the
 moments instead of 5 %."""
-_LEAVES_UPWARDS: Final = 0.018
+_LEAVES_UPWARDS: Final = 0.008
 """Arm lengths that a joint is lifted at most while it leaves its place: as far as it goes aside.
 Without it what peels off slowly slides on the ground, arms of Settle by 0.007 on level ground
-instead of 0.0026. At 0.008, by 0.004 …"""
-_LEAVES: Final = 1e-4
-"""… arm lengths aside within which that comes …"""
-_LEAVES_NEAR: Final = 0.25
-"""… and how loose a joint is taken to be at least: the nearer it is to what lies, the less it rises
-of what it is to. At 1, arms of Settle slide by 0.0033."""
+instead of 0.004. At 0.02, and within 1e-4, by 0.003, but arms of Walk then drift by 0.0051 as they
+let go instead of 0.0046 …"""
+_LEAVES: Final = 5e-4
+"""… and arm lengths aside within which that comes."""
 _TINY: Final = 1e-12
 
 
@@ -539,20 +531,15 @@ def _lifted_to_leave(batch: Batch, own: Floats, lengths: Floats, stance: Stance)
     away *= away / (away + _LEAVES)
     rising = np.zeros(batch.radii.shape)
     rising[first:] = stance.by_tip * whole * _LEAVES_UPWARDS * np.tanh(away / _LEAVES_UPWARDS)
-    return rising / np.maximum(_loose_before(batch, stance), _LEAVES_NEAR)
+    return rising
 
 
 def _dragged(batch: Batch, stance: Stance) -> Floats:
     """How far (batch,), 0…1, a body drags its arms over uneven ground while they hold on."""
-    goes = smooth_step(stance.goes / (_DRAGGED_BY * batch.reach[-1]))
-    return goes * _uneven(stance)
-
-
-def _uneven(stance: Stance) -> Floats:
-    """How far (batch,), 0…1, what an arm lies on is uneven."""
     upward = components_first.normalized(np.sum(stance.normals, axis=0))
     uneven = np.arccos(np.clip(dot(stance.normals, upward).min(axis=0), -1.0, 1.0))
-    return smooth_step(uneven / _DRAGGED_OVER)
+    goes = smooth_step(stance.goes / (_DRAGGED_BY * batch.reach[-1]))
+    return goes * smooth_step(uneven / _DRAGGED_OVER)
 
 
 def _to_goal(batch: Batch, stance: Stance) -> Floats:
@@ -594,24 +581,17 @@ def _knee(batch: Batch, stance: Stance, chord: Floats, longer: Floats) -> Floats
 
 def _freedom(batch: Batch, stance: Stance) -> Floats:
     """How far each segment (segments, batch) is free to turn: 0 where it lies on the ground."""
-    goes = smooth_step(stance.goes / (_GOES_ON * batch.reach[-1]))
-    border = _BORDER + _EVEN_BORDER * goes * (1.0 - _uneven(stance))
-    return smooth_step((stance.contact_from - batch.reach[:-1]) / (border * batch.lengths))
+    return smooth_step((stance.contact_from - batch.reach[:-1]) / (_BORDER * batch.lengths))
 
 
 def _loose(batch: Batch, stance: Stance) -> Floats:
     """How far each joint (segments + 1, batch) may be raised: 0 where it lies, and at the root."""
     reach, width = batch.reach, batch.reach[1]
-    before = _loose_before(batch, stance)
+    before = smooth_step((stance.contact_from - reach) / width)
     after = smooth_step((reach - stance.contact_to) / width)
     return np.maximum(before, np.where(stance.by_tip, 0.0, after)) * loose_from_root(
         reach, reach[-1]
     )
-
-
-def _loose_before(batch: Batch, stance: Stance) -> Floats:
-    """The same of those before what lies, were there no root."""
-    return smooth_step((stance.contact_from - batch.reach) / batch.reach[1])
 
 
 def _asked(batch: Batch, stance: Stance, settings: StanceSettings) -> tuple[Floats, Floats, Floats]:
