@@ -542,12 +542,11 @@ def test_a_drag_goes_on_when_blenders_space_mouse_is_pushed_for_the_first_time(
     try:
         assert after.mouse.held is not None
         mouse.handle(Key("MOUSEMOVE"), view, 0.4, 0.95)
-        for _ in range(120):
+        end = time.monotonic() + PATIENCE
+        while (point := hands.session.held_point()) is None or point[0] <= 0.1:
             after.tick(TOLD)
+            assert time.monotonic() < end, f"waited in vain: the hand follows the mouse; {point}"
             time.sleep(0.005)
-        point = hands.session.held_point()
-        assert point is not None
-        assert point[0] > 0.1
         assert mouse.handle(Key("LEFTMOUSE", "RELEASE"), view, 0.4, 0.95) is Outcome.TAKEN
         assert hands.session.held is None
     finally:
