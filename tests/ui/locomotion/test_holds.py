@@ -34,30 +34,30 @@ def test_suckers_that_hold_on_do_not_roll_out_from_below_their_arm(
 
 
 @pytest.mark.parametrize(
-    ("setup", "ground", "most"),
+    ("setup", "ground"),
     [
-        ("walk", "plane", 0.003),
-        ("walk", "bumps", 0.003),
-        ("crawl", "plane", 0.003),
-        ("tiptoe", "slope", 0.003),
-        ("curl", "bumps", 0.003),
-        ("settle", "plane", 0.005),
+        ("walk", "plane"),
+        ("walk", "bumps"),
+        ("crawl", "plane"),
+        ("tiptoe", "slope"),
+        ("curl", "bumps"),
+        ("settle", "plane"),
+        ("settle", "slope"),
+        ("settle", "stairs"),
     ],
 )
 def test_skin_that_touches_the_ground_keeps_its_place(
     setup: str,
     ground: str,
-    most: float,
     add_on: Any,  # noqa: ARG001
 ) -> None:
     """It slid by 1.1 % of an arm in a walk, where bones rolled; by 0.7 % in Settle, where what
-    peeled off went aside before it rose; and by 0.4 % in Curl. Measured 0.16 to 0.27 %; 0.43 %
-    in Settle.
+    peeled off went aside before it rose; and by 0.4 % in Curl. Measured 0.13 to 0.27 %.
     """
     scene = build(setup, ground)
     played = record(scene.armature, moments(scene.start, scene.end))
     length = referee.arm_length(played, scene.arms)
-    assert referee.creeping(played, Surface.of(scene.ground), length).value < most
+    assert referee.creeping(played, Surface.of(scene.ground), length).value < 0.003
 
 
 @pytest.mark.parametrize("setup", ["idle", "curl"])

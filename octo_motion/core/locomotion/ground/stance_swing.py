@@ -149,13 +149,20 @@ _DRAGGED_OVER: Final = 0.15
 """… nor on even ground, which an arm leaves by itself: radians between upwards where it lies and on
 the whole from which on all of it comes. On any ground, arms of Walk on a slope touch at 13 % of the
 moments instead of 5 %."""
-_LEAVES_UPWARDS: Final = 0.008
-"""Arm lengths that a joint is lifted at most while it leaves its place: as far as it goes aside.
-Without it what peels off slowly slides on the ground, arms of Settle by 0.007 on level ground
-instead of 0.004. At 0.02, and within 1e-4, by 0.003, but arms of Walk then drift by 0.0051 as they
-let go instead of 0.0046 …"""
-_LEAVES: Final = 5e-4
-"""… and arm lengths aside within which that comes."""
+_LEAVES_UPWARDS: Final = (0.008, 0.018)
+"""Arm lengths that a joint is lifted at most while it leaves its place: as far as it goes aside;
+after a short hold, and after a long one. Without it what peels off slowly slides on the ground,
+arms of Settle by 0.007 on level ground instead of 0.0022. With 0.008 after long ones too, and the
+next two numbers of short ones, by 0.0043 …"""
+_LEAVES: Final = (5e-4, 1e-4)
+"""… arm lengths aside within which that comes …"""
+_LEAVES_NEAR: Final = (1.0, 0.25)
+"""… and how loose a joint is taken to be at least: the nearer it is to what lies, the less it rises
+of what it is to."""
+_LONG_HOLD: Final = (0.6, 0.65)
+"""Cycles from which on a hold is no short one, and a long one. If that were all from 0.3 on, arms
+of Walk would drift by 0.0053 as they let go instead of 0.0046, and skin would slide by 0.0034 in a
+hold of Tiptoe on steps instead of 0.0031."""
 _TINY: Final = 1e-12
 
 
@@ -208,7 +215,9 @@ class Stance:
     carried: Floats
     """(3, batch) metres by which they have gone along with the body since, or still will."""
     goes: Floats
-    """(batch,) metres that the arm's root goes while it holds on."""
+    """(batch,) metres that the arm's root goes while it holds on …"""
+    lasts: Floats
+    """(batch,) … and cycles for which it does."""
     normals: Floats
     """(segments + 1 − c, 3, batch) which way up the ground is there."""
     skins: Floats
@@ -274,6 +283,7 @@ def stance_at(batch: Batch, footholds: Footholds, cycles: np.ndarray, since: Flo
         joints=np.ascontiguousarray(joints),
         carried=carried,
         goes=np.sqrt(dot(ends - starts, ends - starts)),
+        lasts=off - on,
         normals=np.ascontiguousarray(np.moveaxis(footholds.normals[at], 0, -1)),
         skins=np.ascontiguousarray(footholds.skins[at].T),
         touching=footholds.touching,
@@ -528,10 +538,15 @@ def _lifted_to_leave(batch: Batch, own: Floats, lengths: Floats, stance: Stance)
     joints = np.concatenate([batch.roots[None], lengths[:, None] * own]).cumsum(axis=0)
     aside = joints[first:, :2] - stance.joints[:, :2] - stance.carried[:2]
     away = np.sqrt(dot(aside, aside)) / whole
-    away *= away / (away + _LEAVES)
+    begins, ends = _LONG_HOLD
+    long = smooth_step((stance.lasts - begins) / (ends - begins))
+    within, most, near = (
+        short + long * (other - short) for short, other in (_LEAVES, _LEAVES_UPWARDS, _LEAVES_NEAR)
+    )
+    away *= away / (away + within)
     rising = np.zeros(batch.radii.shape)
-    rising[first:] = stance.by_tip * whole * _LEAVES_UPWARDS * np.tanh(away / _LEAVES_UPWARDS)
-    return rising
+    rising[first:] = stance.by_tip * whole * most * np.tanh(away / most)
+    return rising / np.maximum(_loose_before(batch, stance), near)
 
 
 def _dragged(batch: Batch, stance: Stance) -> Floats:
@@ -587,11 +602,16 @@ def _freedom(batch: Batch, stance: Stance) -> Floats:
 def _loose(batch: Batch, stance: Stance) -> Floats:
     """How far each joint (segments + 1, batch) may be raised: 0 where it lies, and at the root."""
     reach, width = batch.reach, batch.reach[1]
-    before = smooth_step((stance.contact_from - reach) / width)
+    before = _loose_before(batch, stance)
     after = smooth_step((reach - stance.contact_to) / width)
     return np.maximum(before, np.where(stance.by_tip, 0.0, after)) * loose_from_root(
         reach, reach[-1]
     )
+
+
+def _loose_before(batch: Batch, stance: Stance) -> Floats:
+    """The same of those before what lies, were there no root."""
+    return smooth_step((stance.contact_from - batch.reach) / batch.reach[1])
 
 
 def _asked(batch: Batch, stance: Stance, settings: StanceSettings) -> tuple[Floats, Floats, Floats]:
