@@ -42,7 +42,7 @@ def energy_of(world: World) -> Energy:
 
 def joint_turns(world: World) -> Floats:
     """(bodies, 4) orientation of each body in its parent's frame (a root's in the world's)."""
-    return world._bodies.turns()
+    return world._bodies.turns.copy()
 
 
 def joint_springs(world: World) -> Floats:

@@ -56,9 +56,33 @@ def to_matrix(quaternions: Floats) -> Floats:
     return (pairs @ _MATRIX).reshape(-1, 3, 3)
 
 
-def to_transforms(quaternions: Floats) -> tuple[Floats, Floats]:
-    """Homogeneous matrices of rotations (count, 4, 4), and their transposes, both contiguous."""
-    pairs = (quaternions @ _EACH) * (quaternions @ _ALL)
+def left_factor(quaternions: Floats) -> Floats:
+    """What products need of their first quaternions (count, 4), for those that have many of them
+    (count, 16).
+    """
+    return quaternions @ _EACH
+
+
+def right_factor(quaternions: Floats) -> Floats:
+    """The same of their second ones."""
+    return quaternions @ _ALL
+
+
+def product(left: Floats, right: Floats) -> Floats:
+    """``multiply`` of such factors."""
+    return (left * right) @ _PRODUCT
+
+
+def inverse_product(left: Floats, right: Floats) -> Floats:
+    """``conjugate_multiply`` of such factors."""
+    return (left * right) @ _INVERSE_PRODUCT
+
+
+def to_transforms(left: Floats, right: Floats) -> tuple[Floats, Floats]:
+    """Homogeneous matrices of rotations (count, 4, 4), and their transposes, both contiguous, of
+    both factors of their quaternions.
+    """
+    pairs = left * right
     return (pairs @ _TRANSFORM).reshape(-1, 4, 4), (pairs @ _TRANSPOSED).reshape(-1, 4, 4)
 
 

@@ -42,7 +42,7 @@ class Bodies:
         self.spin = np.zeros((count, 3))
         """(bodies, 3) angular momenta about the centres of mass, world axes."""
         self.place(pose)
-        self.rest = self.turns()
+        self.rest = self.turns.copy()
         """(bodies, 4) where the joints' springs have their rest, in the parents' frames."""
 
     # Where they are
@@ -58,8 +58,10 @@ class Bodies:
     def refresh(self) -> None:
         """Matrices and places, from orientations and roots."""
         tree = self._tree
+        left = small_batches.left_factor(self.orientations)
+        self._factor = small_batches.right_factor(self.orientations)
         # (bodies, 4, 4) homogeneous, without the places yet; and the same, transposed.
-        self.transforms, self.transposed = small_batches.to_transforms(self.orientations)
+        self.transforms, self.transposed = small_batches.to_transforms(left, self._factor)
         self.matrices = self.transforms[:, :3, :3]
         """(bodies, 3, 3)"""
         roots = self._roots
@@ -68,25 +70,20 @@ class Bodies:
         parents[roots] = _UNIT
         self.parent_matrices = parents
         """(bodies, 3, 3) the parents', of roots the world's."""
-        self.parent_turns = self.orientations.take(self.parent_or_self, 0)
-        """(bodies, 4) the same as quaternions."""
-        self.parent_turns[roots] = _UNTURNED
+        before = left.take(self.parent_or_self, 0)
+        before[roots] = _UNTURNED
+        self.turns = small_batches.inverse_product(before, self._factor)
+        """(bodies, 4) orientation of each body in its parent's frame (a root's in the world's)."""
         arms[roots] = self.roots
         self.positions = tree.from_roots(arms)
         """(bodies, 3) of the joints."""
-
-    def turns(self) -> Floats:
-        """(bodies, 4) orientation of each body in its parent's frame (a root's in the world's)."""
-        return small_batches.conjugate_multiply(self.parent_turns, self.orientations)
 
     # Springs
 
     def springs(self) -> Floats:
         """(bodies, 3) q_f of the elements: rotation vectors in world axes."""
-        at_rest = small_batches.multiply(self.parent_turns, self.rest)
-        return small_batches.to_rotation_vector(
-            small_batches.multiply_conjugate(self.orientations, at_rest)
-        )
+        bent = small_batches.multiply_conjugate(self.turns, self.rest)
+        return matvec(self.parent_matrices, small_batches.to_rotation_vector(bent))
 
     # How they move
 
@@ -101,7 +98,7 @@ class Bodies:
 
     def stop(self) -> None:
         """Take all velocities away, and let the springs have their rest where the joints are."""
-        self.rest = self.turns()
+        self.rest = self.turns.copy()
         for array in (self.linear, self.angular, self.spin):
             array[:] = 0.0
 
@@ -109,9 +106,9 @@ class Bodies:
         """Turn joints of a mask (bodies,) as a pose has them, with relaxed springs; the others stay
         as they are, and so do velocities.
         """
-        positions, turns = self.positions, self.turns()
+        positions, turns = self.positions, self.turns.copy()
         self.place(pose)
-        turns[joints] = self.rest[joints] = self.turns()[joints]
+        turns[joints] = self.rest[joints] = self.turns[joints]
         self.place(pose_of(self._figure, turns, positions))
 
     def kept_spin(self) -> Floats:
@@ -146,28 +143,28 @@ class Bodies:
         self,
         turns: Floats,
         shifts: Floats,
-        springs: Floats | None = None,
+        to_rest: Floats | None = None,
         flows: Flags | None = None,
     ) -> None:
         """Turn by rotation vectors (bodies, 3) and shift the roots by (roots, 3), world axes.
 
-        Where ``springs`` (bodies, 3) are given, in the parents' frames, the rest of those that flow
-        (bodies,) moves so that they are bent by them.
+        The rest of joints that flow (bodies,) moves to where rotation vectors (bodies, 3), in the
+        parents' frames, then lead from where they are.
         """
         count = len(turns)
-        vectors = turns if springs is None else np.concatenate([turns, -springs])
-        turned = small_batches.from_rotation_vector(vectors)
-        orientations = small_batches.multiply(turned[:count], self.orientations)
+        vectors = turns if to_rest is None else np.concatenate([turns, to_rest])
+        turned = small_batches.left_factor(small_batches.from_rotation_vector(vectors))
+        orientations = small_batches.product(turned[:count], self._factor)
         size = np.sqrt(vecdot(orientations, orientations))
         orientations /= size[:, None]
         self.orientations = orientations
         self.roots = self.roots + shifts
         self.refresh()
         if flows is not None:
-            rest = small_batches.multiply(turned[count:], self.turns())
+            rest = small_batches.product(turned[count:], small_batches.right_factor(self.turns))
             np.copyto(self.rest, rest, where=flows[:, None])
 
 
 _CHANGING = ("roots", "orientations", "rest", "linear", "angular", "spin")
 _UNIT = np.eye(3)
-_UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
+_UNTURNED = small_batches.left_factor(np.array([1.0, 0.0, 0.0, 0.0]))

@@ -137,8 +137,8 @@ class CarriedWorld(World):
             self._bodies.rest = small_batches.multiply(self._leading.turns, self._bodies.rest)
         super()._move(problem, solution)
 
-    def _springs_after(self, problem: Problem, solution: Solution) -> Floats:
-        springs = super()._springs_after(problem, solution)
+    def _to_rest_after(self, problem: Problem, solution: Solution) -> Floats:
+        to_rest = super()._to_rest_after(problem, solution)
         assert self._driven is not None
         led = self.settings.step * self._driven
-        return springs - small_batches.vecmat(led, self._bodies.parent_matrices)
+        return to_rest + small_batches.vecmat(led, self._bodies.parent_matrices)

@@ -110,7 +110,6 @@ class Newton:
         self._iterations = iterations
         slots = len(tree.layout.bodies)
         self._joint_blocks = np.zeros((slots, 3, 3))
-        self._joint_right = np.zeros((slots, 3))
         self._slopes: Floats | None = None
         self._pattern: Pattern | None = None
         self._maps = tuple(_with_columns(columns) for columns in (1, 2))
@@ -249,19 +248,21 @@ class Newton:
         if tangents.slopes is not self._slopes:
             self._slopes = tangents.slopes
             self._joint_blocks[tree.joint_slot] = tangents.slopes
-        self._joint_right[tree.joint_slot] = tangents.right
+        firm = 0.0
         if problem.carried is not None:
             # Held so firmly that what hangs on them changes nothing.
             firm = _FIRM * float(problem.masses.sum())
             self._joint_blocks[tree.carried_slots] = firm * _UNIT
-            self._joint_right[tree.carried_slots] = firm * problem.carried
         right = tree.fill(bodies, own, self._joint_blocks)
-        right[: 3 * len(self._joint_right)] += self._joint_right.reshape(-1, 1)
+        of_slots = right[: self._joint_blocks.size // 3].reshape(-1, 3, right.shape[1])
+        of_slots[tree.joint_slot] += tangents.right[:, :, None]
+        if problem.carried is not None:
+            of_slots[tree.carried_slots] += firm * problem.carried[:, :, None]
         if planes is not None and len(rows.paired):
             solved = self._with_pairs(problem, planes, right)
         else:
             solved = tree.solve_all(right)
-        return solved[: 3 * len(self._joint_right)].reshape(-1, 3, right.shape[1])
+        return solved[: of_slots.size // right.shape[1]].reshape(-1, 3, right.shape[1])
 
     def _with_pairs(self, problem: Problem, tangent: Tangent, right: Floats) -> Floats:
         """The solution with contacts between bodies of the figure.

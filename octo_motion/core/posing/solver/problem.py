@@ -147,17 +147,17 @@ class ProblemBuilder:
         momenta = self._weight.copy()
         linear = momenta[:, 3:]
         linear += self._masses * bodies.linear
+        turning = bodies.kept_spin()
         if np.count_nonzero(forces):
             linear += h * forces[:, :3]
-            momenta[:, :3] = h * forces[:, 3:]
-        momenta[:, :3] += matvec(skewed, linear)
-        momenta[:, :3] += bodies.kept_spin()
+            turning += h * forces[:, 3:]
+        np.add(turning, matvec(skewed, linear), out=momenta[:, :3])
         if self._kept is not None:
             momenta *= self._kept
         stops = ()
         if len(self._stops.joints):
-            turning = self._tree.of_joints(speeds)
-            stops = self._stops.near(bodies.turns(), bodies.parent_matrices, turning, h)
+            now = self._tree.of_joints(speeds)
+            stops = self._stops.near(bodies.turns, bodies.parent_matrices, now, h)
         return Problem(
             h,
             joints,

@@ -128,7 +128,8 @@ class Tree:
         if points is self._placed:
             return
         self._placed = points
-        self.motion[self.joint_slot, :, 3:] = -skew(points)
+        # The transpose of a cross product's matrix is its opposite.
+        self.motion[self.joint_slot, :, 3:] = skew(points).transpose(0, 2, 1)
 
     def of_joints(self, speeds: Floats) -> Floats:
         """(bodies, 3) of the joints, of u (slots, 3); perhaps the same numbers in memory."""

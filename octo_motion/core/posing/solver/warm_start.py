@@ -168,8 +168,10 @@ class ContactMemory:
                 self.forget()
             self.wanted, self._answer, self.normals = answer.wanted, answer, contacts.normals
             return
-        size = answer.shares * answer.size
-        shares = answer.shares * np.minimum(most / (size + 1e-300), 1.0)
+        shares = answer.shares
+        size = shares * answer.size
+        if size.max() > most:
+            shares = shares * np.minimum(most / (size + 1e-300), 1.0)
         if contacts.labels is not self.labels:
             self.labels, self._key = contacts.labels, contacts.labels.tobytes()
         self.grips = answer.across * shares[:, None]

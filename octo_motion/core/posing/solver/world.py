@@ -353,21 +353,21 @@ class World:
     def _move(self, problem: Problem, solution: Solution) -> None:
         h, tree, bodies = self.settings.step, self._tree, self._bodies
         speeds, turning = solution.speeds, solution.velocities[:, :3]
-        response, springs = solution.response, None
+        response, to_rest = solution.response, None
         if response.flows is not None:
-            springs = self._springs_after(problem, solution)
+            to_rest = self._to_rest_after(problem, solution)
         if solution.moving is not None:
             speeds = solution.moving
             turning = tree.from_roots(tree.of_joints(speeds))
         # A spring is at q_f then; its rest moves by what flowed.
-        bodies.move(h * turning, h * speeds.take(tree.shift_slot, 0), springs, response.flows)
+        bodies.move(h * turning, h * speeds.take(tree.shift_slot, 0), to_rest, response.flows)
 
-    def _springs_after(self, problem: Problem, solution: Solution) -> Floats:
-        """(bodies, 3) q_f at the step's end in the parents' frames: eq. 21."""
-        springs = solution.joint_speeds - solution.response.flows_with()
-        springs *= self.settings.step
-        springs += problem.springs
-        return vecmat(springs, self._bodies.parent_matrices)
+    def _to_rest_after(self, problem: Problem, solution: Solution) -> Floats:
+        """(bodies, 3) −q_f at the step's end in the parents' frames: eq. 21."""
+        to_rest = solution.response.flows_with() - solution.joint_speeds
+        to_rest *= self.settings.step
+        to_rest -= problem.springs
+        return vecmat(to_rest, self._bodies.parent_matrices)
 
     def _use_elements(self) -> None:
         works = ~self._bodies.is_root
