@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,8 @@ SETUPS = (
 _WAY = np.array([[-0.55, 0.17, 0.0], [-0.2, -0.22, 0.0], [0.15, 0.25, 0.0], [0.55, 0.0, 0.0]])
 """A route's control points, in metres for an arm of ``_UNIT``."""
 _RISING = np.array([[-1.8, 0.3, 0.45], [-0.6, -0.75, 0.3], [0.45, 0.9, 0.9], [1.8, 0.15, 1.0]])
+_FARTHEST = 1.1136
+"""Metres of a winding way from the middle to either side, for an arm of ``_UNIT``."""
 _UNIT = 0.58
 RISER = 0.14
 """Arm lengths."""
@@ -61,6 +64,13 @@ class Scene:
     """Bones from root to tip."""
     start: int
     end: int
+
+
+def winding(seed: int) -> Floats:
+    """Control points of a way that nobody chose, as chance has it."""
+    chance = random.Random(seed)  # noqa: S311 - nothing secret
+    way = [[chance.uniform(-_FARTHEST, _FARTHEST) for _ in range(2)] for _ in range(4)]
+    return np.pad(np.array(way), ((0, 0), (0, 1)))
 
 
 def build(

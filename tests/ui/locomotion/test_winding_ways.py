@@ -1,26 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Walks over bumps on ways that nobody chose: they wind as chance has it, as artists' do."""
 
-import random
-
-import numpy as np
 import pytest
 
 from tests.referee import creature_measures as measures
 from tests.referee.recording import moments, record
-from tests.referee.scenes import build
+from tests.referee.scenes import build, winding
 from tests.referee.surface import Surface
 
 pytestmark = pytest.mark.one_blender
-
-FARTHEST = 1.1136
-"""Metres from the middle to either side, for an arm of 0.58 m."""
-
-
-def winding(seed: int) -> np.ndarray:
-    chance = random.Random(seed)  # noqa: S311 - nothing secret
-    way = [[chance.uniform(-FARTHEST, FARTHEST) for _ in range(2)] for _ in range(4)]
-    return np.pad(np.array(way), ((0, 0), (0, 1)))
 
 
 @pytest.mark.parametrize(
