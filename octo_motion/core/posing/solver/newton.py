@@ -254,7 +254,8 @@ class Newton:
             firm = _FIRM * float(problem.masses.sum())
             self._joint_blocks[tree.carried_slots] = firm * _UNIT
         right = tree.fill(bodies, own, self._joint_blocks)
-        of_slots = right[: self._joint_blocks.size // 3].reshape(-1, 3, right.shape[1])
+        unknowns, columns = 3 * len(self._joint_blocks), right.shape[1]
+        of_slots = right[:unknowns].reshape(-1, 3, columns)
         of_slots[tree.joint_slot] += tangents.right[:, :, None]
         if problem.carried is not None:
             of_slots[tree.carried_slots] += firm * problem.carried[:, :, None]
@@ -262,7 +263,7 @@ class Newton:
             solved = self._with_pairs(problem, planes, right)
         else:
             solved = tree.solve_all(right)
-        return solved[: of_slots.size // right.shape[1]].reshape(-1, 3, right.shape[1])
+        return solved[:unknowns].reshape(-1, 3, columns)
 
     def _with_pairs(self, problem: Problem, tangent: Tangent, right: Floats) -> Floats:
         """The solution with contacts between bodies of the figure.
