@@ -239,6 +239,15 @@ def test_small_products_agree_with_the_rotations_of_the_project():
         small_batches.conjugate_multiply(a, b), multiply(conjugate(a), b), atol=1e-14
     )
     np.testing.assert_allclose(small_batches.to_matrix(a), to_matrix(a), atol=1e-14)
+    left, right = small_batches.left_factor(a), small_batches.right_factor(b)
+    np.testing.assert_allclose(small_batches.product(left, right), multiply(a, b), atol=1e-14)
+    np.testing.assert_allclose(
+        small_batches.inverse_product(left, right), multiply(conjugate(a), b), atol=1e-14
+    )
+    there, back = small_batches.to_transforms(left, small_batches.right_factor(a))
+    np.testing.assert_allclose(there[:, :3, :3], to_matrix(a), atol=1e-14)
+    np.testing.assert_allclose(there[:, 3], np.tile([0.0, 0.0, 0.0, 1.0], (7, 1)), atol=1e-14)
+    np.testing.assert_allclose(back, there.transpose(0, 2, 1), atol=1e-14)
     vectors = np.concatenate([rng.normal(size=(7, 3)), np.zeros((1, 3)), [[1e-9, 0.0, 0.0]]])
     turns = small_batches.from_rotation_vector(vectors)
     np.testing.assert_allclose(turns, from_rotation_vector(vectors), atol=1e-14)
