@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -54,3 +56,13 @@ def test_legs_whose_skin_goes_on_beyond_their_bones_stay_out_of_the_ground(
     sunk = measures.sink(played, Surface.of(scene.ground), length)
     # 0.014 and 0.008 arm lengths; as long as the bones said they were, it was 0.074 and 0.069.
     assert sunk.deepest.value <= 0.02
+
+
+@pytest.mark.one_blender
+def test_arms_that_fold_near_the_body_turn_no_faster_for_lying_between_their_neighbours(
+    shared_data: Callable[[str], Path],
+) -> None:
+    scene = scenes.build("curl", "bumps", shared_data("octo/octopus_cheli_sanjuan.glb"))
+    played = record(scene.armature, moments(scene.start, scene.end, 1))
+    # 25.3°; it was 58.4°, as a bone that stood across its arm rolled to its neighbours at once.
+    assert measures.turns(played).value <= 30.0

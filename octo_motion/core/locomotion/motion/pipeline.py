@@ -42,8 +42,8 @@ from ..rig import (
     easing_turns,
     fastest_turn,
     halfway_automatic,
-    keeping_softer_starts,
     keeping_where_calm,
+    keeping_where_gentle,
     keeping_where_it_helps,
     object_transforms,
     root_bone_transforms,
@@ -364,7 +364,16 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     warnings, turning = yield from scaled(making_way, 0.96, 0.98)
     rolled = beside_neighbours(plan, arms, gait)
     if rolled is not arms.rotations:
-        arms.rotations, turning = rolled, None
+        # Some have no time for it: a quick gait's, and those that fold near the body.
+        keeping = keeping_where_gentle(
+            frames_of_arms(creature.skeleton, creature.arms, creature.body),
+            *(arms.rotations, rolled, going[1]),
+            rate=job.timing.rate,
+            limits=_turn_limits(plan, reached),
+            every=plan.stride,
+            cyclic=cyclic,
+        )
+        arms.rotations, turning = (yield from scaled(keeping, 0.98, 0.98)), None
     yield 0.98
     if hands or job.in_place or job.body.trailing is not None or plan.carry is not None:
         # What plays is another motion yet.
@@ -986,7 +995,7 @@ def _softening(
             room.append(course.room(each, radii))
             yield
         lower = room[1] < np.minimum(room[0], 0.0) - TOLERATED
-    arms.rotations = yield from keeping_softer_starts(
+    arms.rotations = yield from keeping_where_gentle(
         *(frames, before, softened, going[1]),
         rate=plan.job.timing.rate,
         limits=limits,

@@ -555,9 +555,9 @@ _MOST_ROLL: Final = np.radians(90.0)
 """… and at most. At 1 for 0.6 a bone of a walk turns by 24° in a frame instead of 20°."""
 _TOO_FAR: Final = np.radians(110.0)
 """From here on they roll less, and half a turn askew not at all: either way would be as good."""
-_IN_TIME: Final = (1.0, 1.8)
-"""Seconds of a cycle up to which arms have no time to roll, and from which on all of it. Without
-that a bone of Hurry over bumps and on a slope each sets out all at once."""
+_IN_TIME: Final = (0.8, 1.0)
+"""Seconds of a cycle up to which arms have no time to roll, and from which on all of it. Half of it
+in Hurry would turn over 1.5 times as much of the web on ways that wind."""
 _NEAR: Final = 0.5
 """Of how far apart the neighbours are at rest: where they are nearer to each other, it is less and
 less told which side is whose."""

@@ -496,32 +496,33 @@ def softening_starts(
     return None if result is rotations else (result, whole)
 
 
-def keeping_softer_starts(
+def keeping_where_gentle(
     arms: Sequence[ArmFrames],
     before: Floats,
-    softened: Floats,
+    changed: Floats,
     orientations: Floats,
     *,
     rate: float,
     limits: Floats,
-    lower: np.ndarray,
+    lower: np.ndarray | None = None,
     every: int = 1,
     cyclic: bool = False,
 ) -> Generator[None, None, Floats]:
-    """Rotations (moments, bones, 4), softened from what they were before; as before wherever an arm
-    sets out all at once still, turns by more for it than it may, or comes to be ``lower`` (moments,
-    arms) than it ought to. In steps; arguments are as of :func:`easing_turns`.
+    """Rotations (moments, bones, 4), changed from what they were before; as before wherever an arm
+    sets out all at once, turns by more for it than it may, or comes to be ``lower`` (moments, arms)
+    than it ought to. In steps; arguments are as of :func:`easing_turns`.
     """
-    starts = _starts(turns_in_world(arms, softened, orientations, every), rate, every)
+    starts = _starts(turns_in_world(arms, changed, orientations, every), rate, every)
     yield
-    bad, start = lower.copy(), 0
+    bad = np.zeros((len(changed), len(arms)), dtype=bool) if lower is None else lower.copy()
+    start = 0
     for number, arm in enumerate(arms):
         own = slice(start, start + len(arm.bones))
         start = own.stop
         bad[every:, number] |= starts[:, own].any(axis=1)
     return (
         yield from _kept(
-            *(arms, before, softened, orientations),
+            *(arms, before, changed, orientations),
             limits=limits,
             every=every,
             cyclic=cyclic,

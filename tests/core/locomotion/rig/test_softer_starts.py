@@ -10,7 +10,7 @@ import pytest
 
 from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, turns_in_world
 from octo_motion.core.locomotion.rig.poses import (
-    keeping_softer_starts,
+    keeping_where_gentle,
     softening_starts,
     turn_limits,
 )
@@ -37,7 +37,7 @@ def softened(
 def kept(arms: list[ArmFrames], before: Floats, after: Floats, lower: Any = None) -> Floats:
     where = np.zeros((FRAMES, len(arms)), dtype=bool) if lower is None else lower
     around: dict[str, Any] = {"rate": 24.0, "limits": turn_limits(24.0, SLOWLY), "lower": where}
-    return finished(keeping_softer_starts(arms, before, after, STILL, **around))
+    return finished(keeping_where_gentle(arms, before, after, STILL, **around))
 
 
 def starts(arms: list[ArmFrames], rotations: Floats, rate: float = 24.0) -> int:
