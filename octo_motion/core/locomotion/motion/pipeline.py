@@ -362,18 +362,9 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
     separate = partial(_separate, plan, arms, reached, going, volume, swimming=swimming)
     making_way = _making_way(plan, arms, reached, going, separate, cyclic=cyclic)
     warnings, turning = yield from scaled(making_way, 0.96, 0.98)
-    rolled = beside_neighbours(plan, arms, gait)
-    if rolled is not arms.rotations:
-        # Some have no time for it: a quick gait's, and those that fold near the body.
-        keeping = keeping_where_gentle(
-            frames_of_arms(creature.skeleton, creature.arms, creature.body),
-            *(arms.rotations, rolled, going[1]),
-            rate=job.timing.rate,
-            limits=_turn_limits(plan, reached),
-            every=plan.stride,
-            cyclic=cyclic,
-        )
-        arms.rotations, turning = (yield from scaled(keeping, 0.98, 0.98)), None
+    rolling = _rolling(plan, arms, reached, going, gait, cyclic=cyclic)
+    if (yield from scaled(rolling, 0.98, 0.98)):
+        turning = None
     yield 0.98
     if hands or job.in_place or job.body.trailing is not None or plan.carry is not None:
         # What plays is another motion yet.
@@ -392,6 +383,33 @@ def _posed(plan: MotionPlan, times: Floats, step: int, *, cyclic: bool) -> Steps
         keyed = going = object_transforms(creature.body, creature.scale, *eased)
     shown = (arms, going, own, keyed, swimming, reached, warnings, hands, planned, turning)
     return _Posed(travel.phase, *shown)
+
+
+def _rolling(
+    plan: MotionPlan,
+    arms: ArmMotion,
+    reached: Reached | None,
+    going: Travelled,
+    gait: tuple[Floats, Floats],
+    *,
+    cyclic: bool,
+) -> Generator[None, None, bool]:
+    """Let arms roll towards their neighbours, as their gait has these, wherever they have time for
+    it: in a quick gait, and where they fold near the body, some have none. Whether any may roll.
+    """
+    creature = plan.job.creature
+    rolled = beside_neighbours(plan, arms, gait)
+    if rolled is arms.rotations:
+        return False
+    arms.rotations = yield from keeping_where_gentle(
+        frames_of_arms(creature.skeleton, creature.arms, creature.body),
+        *(arms.rotations, rolled, going[1]),
+        rate=plan.job.timing.rate,
+        limits=_turn_limits(plan, reached),
+        every=plan.stride,
+        cyclic=cyclic,
+    )
+    return True
 
 
 def beside_neighbours(
