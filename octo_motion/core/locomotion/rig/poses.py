@@ -512,7 +512,8 @@ def keeping_where_gentle(
     sets out all at once, turns by more for it than it may, or comes to be ``lower`` (moments, arms)
     than it ought to. In steps; arguments are as of :func:`easing_turns`.
     """
-    starts = _starts(turns_in_world(arms, changed, orientations, every), rate, every)
+    now = turns_in_world(arms, changed, orientations, every)
+    starts = _starts(now, rate, every)
     yield
     bad = np.zeros((len(changed), len(arms)), dtype=bool) if lower is None else lower.copy()
     start = 0
@@ -528,6 +529,7 @@ def keeping_where_gentle(
             cyclic=cyclic,
             spoilt=lambda was, left: left > max(was, 0.0) + _SAME,
             bad=bad,
+            now=now,
         )
     )
 
@@ -732,15 +734,18 @@ def _kept(
     cyclic: bool,
     spoilt: Callable[[float, float], bool],
     bad: np.ndarray | None = None,
+    now: Floats | None = None,
 ) -> Generator[None, None, Floats]:
     """Rotations (moments, bones, 4), and as before wherever a stretch of an arm is spoilt: told by
     what it turned by beyond the limits at most, and what it turns by beyond them now; or for
-    moments of it that are bad (moments, arms) anyway.
+    moments of it that are bad (moments, arms) anyway. Changed, they turn by so much ``now``
+    (moments − every, bones), if that is known.
     """
     then = turns_in_world(arms, before, orientations, every)
     yield
-    now = turns_in_world(arms, changed, orientations, every)
-    yield
+    if now is None:
+        now = turns_in_world(arms, changed, orientations, every)
+        yield
     result, start = changed.copy(), 0
     limits = np.broadcast_to(limits, (len(then), len(arms)))
     for number, arm in enumerate(arms):
