@@ -169,6 +169,13 @@ class _Following:
             return LATER
         if self.seen:
             spare_what_is_there(type(self).__name__)
+        for name in list(self.changed):
+            _let_blender_tell(name)
+        self._follow_changed()
+        return None
+
+    def _follow_changed(self) -> None:
+        """Show the frame in sight of what has changed; all others follow a little later."""
         changed = dict(self.changed)
         self.changed.clear()
         for name, certain in changed.items():
@@ -177,7 +184,6 @@ class _Following:
         stop_timer(self.run_following)
         if self.following:
             bpy.app.timers.register(self.run_following, first_interval=0.0 if plays() else IDLE)
-        return None
 
     def _run_following(self) -> float | None:
         """What another timer does: all other frames, in short turns.
@@ -186,16 +192,18 @@ class _Following:
         """
         if self.busy or self.must_wait():
             return LATER
-        if not self.pending():
-            for name in list(self.following)[:1]:
+        for name in list(self.following)[:1]:
+            _let_blender_tell(name)
+            if not self.pending():
                 self.go_on(name, TURN)
         return 0.0 if self.following else None
 
     def finish_following(self) -> None:
         """Make all motions that are on their way at once."""
-        if self.pending():
-            stop_timer(self.run_pending)
-            self.run_pending()
+        for name in list(self.seen):
+            _let_blender_tell(name)
+        stop_timer(self.run_pending)
+        self._follow_changed()
         stop_timer(self.run_following)
         while self.following:
             self.go_on(next(iter(self.following)), np.inf)
@@ -621,6 +629,17 @@ def _windows(armature: bpy.types.Object) -> list[bpy.types.Window]:
     if manager is None:
         return []
     return [each for each in manager.windows if armature.name in each.view_layer.objects]
+
+
+def _let_blender_tell(name: str) -> None:
+    """Have Blender tell now what has changed around an armature. A turn may come between a change
+    and that: with what the turn writes, which is told while nobody listens, it would be lost.
+    """
+    armature = armature_named(name)
+    if armature is not None:
+        with window_of(armature):
+            if bpy.context.view_layer is not None:
+                bpy.context.view_layer.update()
 
 
 def window_of(armature: bpy.types.Object) -> AbstractContextManager[object]:

@@ -933,6 +933,57 @@ def test_a_drag_while_an_action_is_half_written_is_followed(slowly: Any) -> None
     assert motion(slowly) == followed
 
 
+def drag_cadence(armature: Any) -> None:
+    """What dragging a slider leaves behind until Blender gets to its next update."""
+    settings_of(armature).timing, settings_of(armature).cycle_time = "CADENCE", 3.1
+    armature.update_tag(refresh={"OBJECT", "DATA"})
+
+
+@pytest.mark.one_blender
+def test_a_slider_dragged_right_before_keys_are_written_is_followed(slowly: Any) -> None:
+    half_written(slowly)
+    drag_cadence(slowly)
+    live.run_following()  # comes before Blender's update
+    assert live.pending()
+    stop_timer(live.run_pending)
+    live.run_pending()
+    live.finish_following()
+    followed = motion(slowly)
+    generate(slowly)
+    assert motion(slowly) == followed
+
+
+@pytest.mark.one_blender
+def test_a_slider_dragged_right_before_another_octopus_follows_is_followed(octopus: Any) -> None:
+    other = make_octopus("Other")
+    give_route(other)
+    settings_of(other).live = True
+    settle()
+    before, made = motion(octopus), MADE.count(octopus.name)
+    drag_route(other)
+    bpy.context.view_layer.update()
+    drag_cadence(octopus)
+    stop_timer(live.run_pending)
+    live.run_pending()  # comes before Blender's update
+    bpy.context.view_layer.update()
+    assert MADE.count(octopus.name) > made or live.pending()
+    live.finish_following()
+    assert motion(octopus) != before
+
+
+@pytest.mark.one_blender
+def test_a_slider_dragged_right_before_the_file_is_saved_is_followed(
+    octopus: Any, tmp_path: Path
+) -> None:
+    before = motion(octopus)
+    drag_cadence(octopus)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    saved = motion(octopus)
+    assert saved != before
+    generate(octopus)
+    assert motion(octopus) == saved
+
+
 @pytest.mark.one_blender
 def test_the_way_and_its_footholds_are_drawn_until_the_motion_is_there(octopus: Any) -> None:
     settings_of(octopus).ground.object = make_square(20.0)
