@@ -509,18 +509,20 @@ def keeping_where_gentle(
     cyclic: bool = False,
 ) -> Generator[None, None, Floats]:
     """Rotations (moments, bones, 4), changed from what they were before; as before wherever an arm
-    sets out all at once, turns by more for it than it may, or comes to be ``lower`` (moments, arms)
-    than it ought to. In steps; arguments are as of :func:`easing_turns`.
+    sets out all at once by more for it, turns by more than it may, or comes to be ``lower``
+    (moments, arms) than it ought to. In steps; arguments are as of :func:`easing_turns`, and each
+    stretch counts by itself.
     """
-    now = turns_in_world(arms, changed, orientations, every)
-    starts = _starts(now, rate, every)
+    then = turns_in_world(arms, before, orientations, every)
     yield
-    bad = np.zeros((len(changed), len(arms)), dtype=bool) if lower is None else lower.copy()
-    start = 0
-    for number, arm in enumerate(arms):
-        own = slice(start, start + len(arm.bones))
-        start = own.stop
-        bad[every:, number] |= starts[:, own].any(axis=1)
+    now = turns_in_world(arms, changed, orientations, every)
+    yield
+    more = np.subtract(*(each * _starts(each, rate, every) for each in (now, then)))
+    worse = np.zeros((len(changed), len(arms)))
+    ends = np.cumsum([len(arm.bones) for arm in arms])
+    worse[every:] = np.add.reduceat(more, np.concatenate([[0], ends[:-1]]), axis=1)
+    if lower is not None:
+        worse[lower] = np.inf
     return (
         yield from _kept(
             *(arms, before, changed, orientations),
@@ -528,8 +530,8 @@ def keeping_where_gentle(
             every=every,
             cyclic=cyclic,
             spoilt=lambda was, left: left > max(was, 0.0) + _SAME,
-            bad=bad,
-            now=now,
+            worse=worse,
+            turning=(then, now),
         )
     )
 
@@ -733,21 +735,21 @@ def _kept(
     every: int,
     cyclic: bool,
     spoilt: Callable[[float, float], bool],
-    bad: np.ndarray | None = None,
-    now: Floats | None = None,
+    worse: Floats | None = None,
+    turning: tuple[Floats, Floats] | None = None,
 ) -> Generator[None, None, Floats]:
     """Rotations (moments, bones, 4), and as before wherever a stretch of an arm is spoilt: told by
-    what it turned by beyond the limits at most, and what it turns by beyond them now; or for
-    moments of it that are bad (moments, arms) anyway. Changed, they turn by so much ``now``
-    (moments − every, bones), if that is known.
+    what it turned by beyond the limits at most, and what it turns by beyond them now; or all in all
+    ``worse`` (moments, arms). Before and after they turn by so much (moments − every, bones), if
+    that is known.
     """
-    then = turns_in_world(arms, before, orientations, every)
-    yield
-    if now is None:
-        now = turns_in_world(arms, changed, orientations, every)
+    if turning is None:
+        then = turns_in_world(arms, before, orientations, every)
+        yield
+        turning = then, turns_in_world(arms, changed, orientations, every)
         yield
     result, start = changed.copy(), 0
-    limits = np.broadcast_to(limits, (len(then), len(arms)))
+    limits = np.broadcast_to(limits, (len(turning[0]), len(arms)))
     for number, arm in enumerate(arms):
         own = slice(start, start + len(arm.bones))
         start, most = own.stop, limits[:, number, None]
@@ -760,10 +762,10 @@ def _kept(
                     (each[:, own] - most)[max(first - every, 0) : end].max(initial=-np.inf)
                     for first, end in stretch
                 )
-                for each in (then, now)
+                for each in turning
             )
-            hopeless = bad is not None and any(
-                bad[first:end, number].any() for first, end in stretch
+            hopeless = worse is not None and (
+                sum(worse[first : end + 2 * every, number].sum() for first, end in stretch) > _SAME
             )
             if hopeless or spoilt(was, left):
                 for first, end in stretch:

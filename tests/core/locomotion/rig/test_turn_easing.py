@@ -12,6 +12,7 @@ from octo_motion.core.locomotion.rig.bone_rotations import ArmFrames, frames_of_
 from octo_motion.core.locomotion.rig.poses import (
     easing_turns,
     keeping_where_calm,
+    keeping_where_gentle,
     keeping_where_it_helps,
     turn_limits,
 )
@@ -218,3 +219,20 @@ def test_an_arm_that_makes_way_too_fast_goes_as_before_and_the_others_make_way()
     changed[:, 3] = from_axis_angle(np.array([1.0, 0.0, 0.0]), np.full(FRAMES, 0.1))
     kept = finished(keeping_where_calm(arms, fast, changed, STILL, limits=limits))
     np.testing.assert_array_equal(kept, changed)
+
+
+def test_arms_change_where_fewer_bones_set_out_all_at_once_and_nowhere_where_more_do() -> None:
+    arms = arms_of()
+    bones, limits = len(arms[0].bones), turn_limits(24.0, SLOWLY)
+    jerk = 0.9 * FASTEST / 24.0
+    # Two bones of one arm, and one of another, stand still and are off all at once.
+    before = flipping(jerk, 60, len(arms), bones, 2)
+    before[:, 4] = flipping(jerk, 64, len(arms), bones, 4)[:, 4]
+    before[:, bones + 3] = flipping(jerk, 60, len(arms), bones, 3)[:, 3]
+    changed = before.copy()
+    # Of the one arm one of both does so no more, of the other one more does.
+    changed[60:, 2] = before[59, 2]
+    changed[:, bones + 1] = flipping(jerk, 62, len(arms), bones, 1)[:, 1]
+    kept = finished(keeping_where_gentle(arms, before, changed, STILL, rate=24.0, limits=limits))
+    np.testing.assert_array_equal(kept[:, :bones], changed[:, :bones])
+    np.testing.assert_array_equal(kept[:, bones:], before[:, bones:])
