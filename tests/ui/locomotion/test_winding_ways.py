@@ -75,6 +75,19 @@ def test_arms_go_neither_through_each_other_nor_through_the_siphon(
     assert told["OVERLAP"] <= 0.05
 
 
+# Where neighbours lay was told without their tips: these lay across each other, 1.9 to 2.4 of their
+# radii deep.
+@pytest.mark.parametrize(
+    ("ground", "seed"), [("plane", 1), ("plane", 6), ("bumps", 1), ("slope", 5), ("stairs", 2)]
+)
+def test_arms_that_lie_long_do_not_come_down_across_each_others_tips(
+    ground: str, seed: int
+) -> None:
+    scene = build("settle", ground, way=winding(seed))
+    told = {each.kind: each.value for each in scene.armature.octo_motion.locomotion.figures}
+    assert told["OVERLAP"] <= 0.05
+
+
 # Seven and five bones stood still for a frame and then turned by 16° to 34° in one.
 @pytest.mark.parametrize("ground", ["bumps", "slope"])
 def test_in_a_hurry_no_bone_sets_out_all_at_once(ground: str) -> None:

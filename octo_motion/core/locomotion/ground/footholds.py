@@ -20,6 +20,7 @@ from typing import Final
 import numpy as np
 
 from ...rotations import Floats, rotate, rotate_in_plane
+from ...smoothing import smooth_step
 from ..gait import CYCLE, UnevenHolds
 from ..path import Line, values_along
 from .arm_curves import laid
@@ -438,10 +439,10 @@ def laying(
     # A place hangs on those of its neighbours in the cycles beside it, once for each look at them.
     wide = np.arange(cycles[0] - _LOOKS, cycles[1] + _LOOKS + 1)
     roots = _RootPath(limbs, line, timing, wide, middle / CYCLE)
-    placed = yield from _placing(roots, ground, settings, contact_overrides, uneven)
+    curls = _curls(limbs, 0 * wide if cyclic else wide, seed)
+    placed = yield from _placing(roots, ground, settings, contact_overrides, uneven, curls=curls)
     placed, numbers = placed.part(slice(_LOOKS, -_LOOKS)), wide[_LOOKS:-_LOOKS]
-    skins = _as_if_round(limbs, joint, len(numbers))
-    curl = _curls(limbs, 0 * numbers if cyclic else numbers, seed) + placed.bent
+    skins, curl = _as_if_round(limbs, joint, len(numbers)), placed.curls
     lie = {"skins": skins, "spot": placed.spots, "heading": placed.headings, "curl": curl}
     joints = laid(limbs, ground, joint, **lie, rough=rough)
     yield
@@ -497,8 +498,8 @@ class _Placed:
     """(arms, cycles, 3) where they touch, world …"""
     headings: Floats
     """… and which way they lie from there, radians about Z …"""
-    bent: Floats
-    """… and by how many they are bent to one side more than usual."""
+    curls: Floats
+    """… and by how many they are bent to one side on the way to the tip."""
     present: np.ndarray
     """Whether there is one at all."""
 
@@ -513,17 +514,21 @@ def _placing(
     settings: StanceSettings,
     contact_overrides: Sequence[ContactOverride],
     uneven: UnevenHolds | None,
+    *,
+    curls: Floats,
 ) -> Generator[None, None, _Placed]:
-    """Where and when arms take hold, in steps: as the artist wishes, or as they do with ease."""
+    """Where and when arms take hold, in steps: as the artist wishes, or as they do with ease. What
+    lies is usually bent by so much (arms, cycles).
+    """
     limbs, numbers = path.limbs, path.numbers
     shape = len(limbs.arms), len(numbers)
     overridden = _overridden(limbs, shape, int(numbers[0]), contact_overrides)
-    late, *beside, bent = _differing(uneven, limbs, numbers)
-    shift = overridden.shift + late
+    late, aside, beyond, bent = _differing(uneven, limbs, numbers)
+    shift, beside = overridden.shift + late, (aside, beyond, curls + bent)
     spot, lie, half, firm = yield from _finding_places(path, shift, ground, settings, beside)
     spot, heading = overridden.put(spot, np.arctan2(lie[..., 1], lie[..., 0]))
     present = overridden.present & (firm | overridden.moved)
-    return _Placed(shift, half, spot, heading, bent, present)
+    return _Placed(shift, half, spot, heading, beside[2], present)
 
 
 @dataclass(frozen=True, eq=False)
@@ -573,8 +578,8 @@ def _finding_places(
 ) -> Generator[None, None, tuple[Floats, Floats, Floats, np.ndarray]]:
     """Where arms touch (arms, cycles, 3), which way they lie (arms, cycles, 2), half of how long
     they do (arms, cycles), in cycles, and whether at all (arms, cycles); stances (arms, cycles) are
-    shifted by so many cycles, and places are beside the usual ones by radians and arm lengths
-    (arms, cycles). In steps.
+    shifted by so many cycles, places are beside the usual ones by radians and arm lengths (arms,
+    cycles), and what lies there is bent to one side by radians (arms, cycles). In steps.
     """
     limbs = path.limbs
     turns, away = path.timing.aims(limbs.arms, path.numbers)
@@ -598,9 +603,11 @@ def _finding_places(
     distance, half = found(aim)
     yield
     neighbours = Neighbours.of(limbs, *path.holds(shift, half), path.line)
-    for _ in range(_LOOKS):
+    resting = smooth_step((2.0 * half - _LONG[0]) / (_LONG[1] - _LONG[0]))
+    for number in range(_LOOKS):
         seen = roots[..., :2] + distance[..., None] * aim
-        turned = neighbours.aside(limbs, joint, seen, lie, distance)
+        turned = neighbours.aside(limbs, joint, (seen, lie, beside[2]), distance, resting)
+        turned = turned if number < _BRIEFLY else turned * resting
         if not turned.any():
             break
         aim, lie = rotate_in_plane(aim, turned), rotate_in_plane(lie, turned)
@@ -629,18 +636,29 @@ _LONGER: Final = 1.2
 """Times as long as holds last for which they are counted: an arm comes down where another is just
 leaving. At 1 arms go through each other on eight of twelve winding ways still, at 1.4 on one on
 which they did not."""
-_ALONG: Final = np.array([0.0, 0.35])
-"""Where along what lies it is looked at, as shares from where an arm touches to its tip …"""
+_ALONG: Final = np.array([0.0, 0.35, 1.0])
+"""Where along what lies it is looked at, as shares from where an arm touches to its tip. Without
+tips, arms of Settle, which lie long, come down across those of their neighbours on 27 of 40 winding
+ways, by two radii of a tip; with them on six."""
+_THICK: Final = np.array([1.0, 1.0, 0.2])
+"""How thick arms are there, as shares of what they are where they touch."""
+_CHORD: Final = 2.0 / 3.0
+"""Share of the angle by which what lies is bent to one side that its chord is turned by."""
 _HOPS: Final = 2
 """To the how manieth arm it is looked: in a bend the next but one may come down where one holds on
 while the one between them swings."""
 _UNRELATED: Final = np.radians(100.0)
-"""… and how far apart, as the body sees them, places are that have nothing to do with each
-other."""
+"""How far apart, as the body sees them, places are that have nothing to do with each other."""
 _MOST_ASIDE: Final = np.radians(30.0)
 """By which a place is turned about the arm's root at once."""
-_LOOKS: Final = 2
-"""How often it is looked whether they are apart."""
+_LONG: Final = (0.6, 0.65)
+"""Cycles of a hold from which on, and at which, tips count: those of shorter ones are off the
+ground before others come. If they always do, arms turn by 29° in a frame where a swim begins."""
+_BRIEFLY: Final = 2
+"""How often it is looked whether arms are apart that hold on for less …"""
+_LOOKS: Final = 6
+"""… and at most: an arm that is turned away from one comes to be near to another. With two, tips
+are still across others on seven of fourteen of those ways."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -684,30 +702,41 @@ class Neighbours:
         return cls((one[pair], other[pair]), (cycle, cycle + step - 1), centres)
 
     def aside(
-        self, limbs: Limbs, joint: int, spots: Floats, lie: Floats, distance: Floats
+        self,
+        limbs: Limbs,
+        joint: int,
+        lies: tuple[Floats, Floats, Floats],
+        distance: Floats,
+        resting: Floats,
     ) -> Floats:
         """Radians (arms, cycles), anticlockwise, by which places are to be turned about the roots.
 
         Args:
             limbs: the arms.
             joint: the one that touches first.
-            spots: (arms, cycles, 2) where it does, seen from above.
-            lie: (arms, cycles, 2) unit vectors along which arms lie from there.
+            lies: (arms, cycles, 2) where it does, seen from above, unit vectors (arms, cycles, 2)
+                along which arms lie from there, and radians (arms, cycles) by which they are bent.
             distance: (arms, cycles) metres from the roots to there.
+            resting: (arms, cycles) how far tips count, 0…1: those of holds that are long.
         """
+        spots, lie, curls = lies
         lying = (limbs.reach[-1] - limbs.reach[joint])[:, None] * _ALONG
         places, away, out = [], [], []
         for arm, cycle in zip(self.arms, self.cycles, strict=True):
             far = lying[arm].T
-            place = spots[arm, cycle] + far[..., None] * lie[arm, cycle]
+            aside = np.multiply.outer(_CHORD * _ALONG**2, curls[arm, cycle])
+            way = np.broadcast_to(lie[arm, cycle], (*aside.shape, 2))
+            place = spots[arm, cycle] + far[..., None] * rotate_in_plane(way, aside)
             places.append(place - self.centres)
             away.append(np.linalg.norm(places[-1], axis=-1))
             out.append(np.maximum(distance[arm, cycle] + far, 1e-9))
         (ax, ay), (bx, by) = (np.moveaxis(each, -1, 0) for each in places)
         between = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
         wide = limbs.radii[joint][self.arms[0]] + limbs.radii[joint][self.arms[1]]
-        needed = _ROOM * wide / np.maximum(0.5 * (away[0] + away[1]), 1e-9)
+        needed = _ROOM * _THICK[:, None] * wide / np.maximum(0.5 * (away[0] + away[1]), 1e-9)
         lacks = np.where(np.abs(between) < _UNRELATED, np.maximum(needed - between, 0.0), 0.0)
+        one, other = (resting[where] for where in zip(self.arms, self.cycles, strict=True))
+        lacks[:, -1] *= np.minimum(one, other)
         back, forth = np.zeros(distance.shape), np.zeros(distance.shape)
         for number, result in ((0, back), (1, forth)):
             turns = np.minimum(0.5 * lacks * away[number] / out[number], _MOST_ASIDE).max(

@@ -37,11 +37,17 @@ def limbs(angles: Floats, free: np.ndarray | None = None) -> Limbs:
     )
 
 
-def turned(arms: Limbs, begins: Floats, ends: Floats, feet: Floats) -> Floats:
-    """By what places at angles (arms, cycles) about the body, a fixed way from it, are turned."""
+def turned(
+    arms: Limbs, begins: Floats, ends: Floats, feet: Floats, curls: Floats | float = 0.0
+) -> Floats:
+    """By what places at angles (arms, cycles) about the body, a fixed way from it, are turned, of
+    arms that lie straight from there, or are bent to one side.
+    """
     lie = np.stack([np.cos(feet), np.sin(feet)], axis=-1)
     found = Neighbours.of(arms, begins, ends, Still())  # pyright: ignore[reportArgumentType]
-    return found.aside(arms, JOINT, 0.35 * lie, lie, np.full(feet.shape, 0.25))
+    lies = 0.35 * lie, lie, np.broadcast_to(curls, feet.shape)
+    away, resting = np.full(feet.shape, 0.25), np.ones(feet.shape)
+    return found.aside(arms, JOINT, lies, away, resting)
 
 
 ALL_ROUND = np.radians(np.arange(8) * 45.0)
@@ -68,6 +74,17 @@ def test_feet_that_are_too_near_or_beyond_each_other_part_both_alike(apart: floa
     np.testing.assert_allclose(result[2, 1], -result[3, 1], rtol=1e-9)
     result[[2, 3], 1] = 0.0
     assert not result.any()
+
+
+def test_arms_whose_tips_are_bent_across_each_other_part() -> None:
+    feet = np.tile(ALL_ROUND[:, None], (1, 3))
+    curls = np.zeros(feet.shape)
+    # Seen from above, anticlockwise and clockwise: towards each other, and then away from it.
+    curls[2, 1], curls[3, 1] = np.radians([80.0, -80.0])
+    result = turned(limbs(ALL_ROUND), BEGINS, ENDS, feet, curls)
+    assert result[2, 1] < 0.0 < result[3, 1]
+    curls[2, 1], curls[3, 1] = np.radians([-20.0, 20.0])
+    assert not turned(limbs(ALL_ROUND), BEGINS, ENDS, feet, curls).any()
 
 
 def test_feet_that_never_hold_on_together_may_be_in_one_place() -> None:
